@@ -1,0 +1,38 @@
+//! Fill: gives the tiles that are left out altogether their fallback value.
+//!
+//! in   guide      rg32uint      full   environment fallback only
+//! in   radiance   any float     full   input fallback only
+//! out  output     rgba16float   full   rgb: fallback radiance; a: 0
+//!
+//! Grid: one 8x8 workgroup per left-out tile (indirect). Touches its own pixel only.
+
+import package::shared::frame;
+import package::shared::packing;
+import package::shared::radiance;
+import package::shared::tiles;
+import package::shared::fallback;
+
+@group(1) @binding(0) var in_guide: texture_2d<u32>;
+@group(1) @binding(1) var<storage, read> in_tiles: array<u32>;
+@group(1) @binding(2) var<storage, read> in_args: array<vec4<u32>, 3>;
+@group(1) @binding(3) var out_output: texture_storage_2d<rgba16float, write>;
+
+@compute @workgroup_size(8, 8)
+fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let index = list_index(group);
+    if index >= in_args[1].w {
+        return;
+    }
+    let counts = tile_counts();
+    let tile = unpack_tile(in_tiles[counts.x * counts.y - 1u - index]);
+    let pixel = tile * TILE_SIZE + lane_position(lane);
+    if any(pixel >= frame.size) {
+        return;
+    }
+    // Only the environment needs the surface.
+    var guide: Guide;
+    if FALLBACK == 2u {
+        guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
+    }
+    textureStore(out_output, pixel, vec4<f32>(fallback_radiance(pixel, guide), 0.0));
+}

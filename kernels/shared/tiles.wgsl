@@ -1,0 +1,29 @@
+// 8x8 tiles and the lists of them that the indirect passes walk.
+
+import package::shared::frame;
+
+const TILE_SIZE: u32 = 8u;
+// Workgroups per row of an indirect grid, so that no dimension passes 65535. `limpid::plan` has the same number.
+const LIST_GRID_WIDTH: u32 = 4096u;
+
+fn tile_counts() -> vec2<u32> {
+    return (frame.size + (TILE_SIZE - 1u)) / TILE_SIZE;
+}
+
+fn pack_tile(tile: vec2<u32>) -> u32 {
+    return tile.x | (tile.y << 16u);
+}
+
+fn unpack_tile(packed: u32) -> vec2<u32> {
+    return vec2<u32>(packed & 0xffffu, packed >> 16u);
+}
+
+// Position in its list that a workgroup of an indirect grid handles.
+fn list_index(group: vec3<u32>) -> u32 {
+    return group.y * LIST_GRID_WIDTH + group.x;
+}
+
+// Position inside an 8x8 tile of an invocation.
+fn lane_position(lane: u32) -> vec2<u32> {
+    return vec2<u32>(lane % TILE_SIZE, lane / TILE_SIZE);
+}

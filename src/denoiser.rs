@@ -1,0 +1,120 @@
+//! The scheduler: keeps what one frame leaves to the next, and says what each frame dispatches.
+
+use glam::UVec2;
+
+use crate::frame::{self, FrameConstants, FrameInputs, Previous};
+use crate::kernel::Kernel;
+use crate::plan::{Grid, Plan};
+use crate::resource::Extent;
+use crate::settings::Settings;
+use crate::{Error, plan};
+
+/// What a backend has to know to run one frame of a [`Plan`].
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct FrameSchedule {
+    /// 0 or 1: which copy of each pair is this frame's, see [`Copy::index`](crate::resource::Copy::index).
+    pub phase: usize,
+    /// Content of the constant buffer.
+    pub constants: FrameConstants,
+}
+
+impl FrameSchedule {
+    /// Workgroups of a pass, unless they come from a buffer.
+    pub fn workgroups(&self, grid: &Grid) -> Option<[u32; 3]> {
+        match grid {
+            Grid::One => Some([1, 1, 1]),
+            Grid::Tiles => {
+                let tiles = Extent::Tile.of(UVec2::from_array(self.constants.size));
+                Some([tiles.x, tiles.y, 1])
+            }
+            Grid::Indirect { .. } => None,
+        }
+    }
+}
+
+/// Decides passes, resources and constants. Backends own one and carry out what it says.
+#[derive(Debug, Clone)]
+pub struct Denoiser {
+    settings: Settings,
+    plan: Plan,
+    kernels: Vec<Kernel>,
+    frame_index: u32,
+    previous: Option<Previous>,
+}
+
+impl Denoiser {
+    /// A denoiser for images of up to `size` pixels.
+    ///
+    /// # Errors
+    ///
+    /// As [`Plan::new`].
+    pub fn new(settings: &Settings, size: UVec2) -> Result<Self, Error> {
+        let (plan, kernels) = Plan::new(settings, size)?;
+        Ok(Self { settings: settings.clone(), plan, kernels, frame_index: 0, previous: None })
+    }
+
+    /// What is allocated and dispatched.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The kernel of each pass of the plan, in order.
+    pub fn kernels(&self) -> &[Kernel] {
+        &self.kernels
+    }
+
+    /// The settings in force.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Changes settings. Returns whether the plan changed, so that the backend has to make its pipelines and
+    /// resources anew; history is lost then. Otherwise only constants changed, and history is kept.
+    ///
+    /// # Errors
+    ///
+    /// As [`Plan::new`]; nothing changes then.
+    pub fn set_settings(&mut self, settings: &Settings) -> Result<bool, Error> {
+        let (plan, kernels) = Plan::new(settings, self.plan.size)?;
+        // The length of stored history is counted in steps that depend on its limit.
+        let rebuilt = plan != self.plan || settings.reproject.max_history != self.settings.reproject.max_history;
+        self.settings = settings.clone();
+        if rebuilt {
+            (self.plan, self.kernels, self.previous) = (plan, kernels, None);
+        }
+        Ok(rebuilt)
+    }
+
+    /// Changes the largest image size. Pipelines stay; resources have to be allocated anew, and history is
+    /// lost.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Size`]; nothing changes then.
+    pub fn resize(&mut self, size: UVec2) -> Result<(), Error> {
+        frame::check_allocation(size)?;
+        self.plan.size = size;
+        self.previous = None;
+        Ok(())
+    }
+
+    /// Goes on to the next frame.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Size`], [`Error::Camera`] or [`Error::FrameInput`]; the denoiser is as before then.
+    pub fn next_frame(&mut self, inputs: &FrameInputs) -> Result<FrameSchedule, Error> {
+        let constants = frame::constants(&self.settings, inputs, self.plan.size, self.previous, self.frame_index)?;
+        let phase = (self.frame_index % 2) as usize;
+        self.frame_index = self.frame_index.wrapping_add(1);
+        self.previous = Some(Previous { camera: inputs.camera, size: inputs.size });
+        Ok(FrameSchedule { phase, constants })
+    }
+
+    /// Where in the buffer `args` the grid of the ray list is, in bytes: workgroups of 64 rays in x, y and z,
+    /// then the number of rays. `None` without a ray list.
+    pub fn ray_args_offset(&self) -> Option<u64> {
+        self.plan.resource("rays").map(|_| plan::RAY_ARGS * plan::ARGS_STRIDE)
+    }
+}

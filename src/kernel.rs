@@ -1,0 +1,399 @@
+//! Kernels: WGSL sources, linked, specialised and reflected. No graphics API is involved.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use naga::back::pipeline_constants::process_overrides;
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga::{AddressSpace, Expression, Handle, ImageClass, Literal, Statement, StorageAccess, TypeInner};
+
+use crate::Error;
+use crate::resource::{Access, Format};
+
+/// File name below `kernels/` without its ending, and text.
+macro_rules! sources {
+    ($($path:literal),* $(,)?) => {
+        &[$(($path, include_str!(concat!("../kernels/", $path, ".wgsl")))),*]
+    };
+}
+
+const SOURCES: &[(&str, &str)] = sources![
+    "classify",
+    "indirect_args",
+    "fill",
+    "reproject",
+    "prefilter",
+    "resolve_temporal",
+    "shared/average",
+    "shared/fallback",
+    "shared/frame",
+    "shared/neighborhood",
+    "shared/packing",
+    "shared/radiance",
+    "shared/tiles",
+];
+
+/// Values of a kernel's `override` constants.
+pub type Overrides = BTreeMap<String, f64>;
+
+fn source(path: &str) -> Option<&'static str> {
+    SOURCES.iter().find(|(name, _)| *name == path).map(|(_, text)| *text)
+}
+
+/// Names of all kernels.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    SOURCES.iter().map(|(path, _)| *path).filter(|path| !path.contains('/'))
+}
+
+/// A kernel with the files it imports spliced in, each once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Linked {
+    /// WGSL.
+    pub text: String,
+    /// File and line number that each line of `text` comes from.
+    pub origins: Vec<(String, u32)>,
+}
+
+impl Linked {
+    /// Replaces line numbers of a report on the linked text by those of the files.
+    fn locate(&self, message: &str, line: Option<u32>) -> String {
+        match line.and_then(|line| self.origins.get(line as usize - 1)) {
+            Some((file, line)) => format!("{file}:{line}: {message}"),
+            None => message.to_owned(),
+        }
+    }
+}
+
+fn splice(path: &str, linked: &mut Linked, seen: &mut HashSet<String>) -> Result<(), String> {
+    if !seen.insert(path.to_owned()) {
+        return Ok(());
+    }
+    let text = source(path).ok_or_else(|| format!("there is no kernels/{path}.wgsl"))?;
+    for (index, line) in text.lines().enumerate() {
+        if let Some(import) = line.strip_prefix("import package::") {
+            splice(&import.trim_end_matches(';').replace("::", "/"), linked, seen)?;
+            continue;
+        }
+        // Headers are documentation comments of the file, which WGSL has no notion of.
+        linked.text.push_str(&if line.starts_with("//!") { line.replacen("//!", "//", 1) } else { line.to_owned() });
+        linked.text.push('\n');
+        linked.origins.push((format!("kernels/{path}.wgsl"), index as u32 + 1));
+    }
+    Ok(())
+}
+
+/// The WGSL of a kernel with its imports in place.
+///
+/// # Errors
+///
+/// [`Error::Kernel`] for a name that does not exist or an import that leads nowhere.
+pub fn link(kernel: &'static str) -> Result<Linked, Error> {
+    let mut linked = Linked { text: String::new(), origins: Vec::new() };
+    splice(kernel, &mut linked, &mut HashSet::new()).map_err(|report| Error::Kernel {
+        kernel,
+        stage: "link",
+        report,
+    })?;
+    Ok(linked)
+}
+
+/// How a kernel uses one of its resources.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Binding {
+    /// Name of the variable.
+    pub name: String,
+    /// Bind group: 0 for what the caller supplies, 1 for what limpid owns.
+    pub group: u32,
+    /// Number in the group.
+    pub binding: u32,
+    /// What kind of resource it is.
+    pub kind: BindingKind,
+}
+
+/// Kind of resource that a kernel expects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BindingKind {
+    /// Constant buffer.
+    Uniform,
+    /// Texture read by texel: float (never filtered).
+    TextureFloat,
+    /// Texture read by texel: unsigned integer.
+    TextureUint,
+    /// Texture written by texel.
+    StorageTexture(Format),
+    /// Storage buffer.
+    StorageBuffer(Access),
+}
+
+impl BindingKind {
+    /// How the kernel accesses it.
+    pub fn access(self) -> Access {
+        match self {
+            Self::Uniform | Self::TextureFloat | Self::TextureUint => Access::Read,
+            Self::StorageTexture(_) => Access::Write,
+            Self::StorageBuffer(access) => access,
+        }
+    }
+}
+
+/// A kernel made for one set of overrides: constants are folded, and what they switch off is gone from code
+/// and bindings.
+#[derive(Debug, Clone)]
+pub struct Kernel {
+    /// Name of kernel, file and entry point.
+    pub name: &'static str,
+    /// The program.
+    pub module: naga::Module,
+    /// What validation found out about `module`.
+    pub info: ModuleInfo,
+    /// Its resources, by group and number.
+    pub bindings: Vec<Binding>,
+    /// Invocations per workgroup.
+    pub workgroup_size: [u32; 3],
+}
+
+fn validator() -> Validator {
+    // pack2x16float is part of WebGPU, but not of naga's default.
+    let capabilities = Capabilities::default() | Capabilities::SHADER_FLOAT16_IN_FLOAT32;
+    Validator::new(ValidationFlags::all(), capabilities)
+}
+
+impl Kernel {
+    /// Links, parses, specialises, validates and reflects a kernel. Overrides that are not given keep their
+    /// defaults.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Kernel`] with file and line where they are known.
+    pub fn new(name: &'static str, overrides: &Overrides) -> Result<Self, Error> {
+        let linked = link(name)?;
+        Self::from_linked(name, &linked, overrides)
+    }
+
+    fn from_linked(name: &'static str, linked: &Linked, overrides: &Overrides) -> Result<Self, Error> {
+        let fail = |stage, report| Error::Kernel { kernel: name, stage, report };
+        let line_of = |location: Option<naga::SourceLocation>| location.map(|at| at.line_number);
+        let parsed = naga::front::wgsl::parse_str(&linked.text)
+            .map_err(|e| fail("parse", linked.locate(e.message(), line_of(e.location(&linked.text)))))?;
+        let checked = validator().validate(&parsed).map_err(|e| {
+            let cause = format!("{:#}", DisplayChain(e.as_inner()));
+            fail("validate", linked.locate(&cause, line_of(e.location(&linked.text))))
+        })?;
+        let constants: HashMap<String, f64> = overrides.iter().map(|(k, v)| (k.clone(), *v)).collect();
+        let entry_point = Some((naga::ShaderStage::Compute, name));
+        let (module, _) = process_overrides(&parsed, &checked, entry_point, &constants.into_iter().collect())
+            .map_err(|e| fail("specialise", e.to_string()))?;
+        let mut module = module.into_owned();
+        remove_dead_branches(&mut module);
+        naga::compact::compact(&mut module, naga::compact::KeepUnused::No);
+        let info = validator()
+            .validate(&module)
+            .map_err(|e| fail("validate after specialising", DisplayChain(e.as_inner()).to_string()))?;
+        let bindings = reflect(&module).map_err(|report| fail("reflect", report))?;
+        let entry_point =
+            module.entry_points.first().ok_or_else(|| fail("reflect", format!("there is no entry point `{name}`")))?;
+        let workgroup_size = entry_point.workgroup_size;
+        Ok(Self { name, module, info, bindings, workgroup_size })
+    }
+}
+
+/// An error and its causes in one line.
+struct DisplayChain<'a>(&'a dyn std::error::Error);
+
+impl std::fmt::Display for DisplayChain<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.0)?;
+        let mut cause = self.0.source();
+        while let Some(error) = cause {
+            write!(f, ": {error}")?;
+            cause = error.source();
+        }
+        Ok(())
+    }
+}
+
+/// Puts the taken side of every `if` on a constant in its place. naga keeps both, and with the dead one every
+/// resource that it mentions.
+fn remove_dead_branches(module: &mut naga::Module) {
+    let functions = module.functions.iter_mut().map(|(_, function)| function);
+    let entry_points = module.entry_points.iter_mut().map(|entry_point| &mut entry_point.function);
+    for function in functions.chain(entry_points) {
+        let body = std::mem::take(&mut function.body);
+        function.body = live_block(body, &function.expressions);
+        // A name keeps its expression alive: only those that are still evaluated may.
+        let mut evaluated = HashSet::new();
+        collect_evaluated(&function.body, &mut evaluated);
+        function.named_expressions.retain(|expression, _| evaluated.contains(expression));
+    }
+}
+
+fn constant_condition(condition: Handle<Expression>, expressions: &naga::Arena<Expression>) -> Option<bool> {
+    match expressions[condition] {
+        Expression::Literal(Literal::Bool(value)) => Some(value),
+        _ => None,
+    }
+}
+
+fn live_block(block: naga::Block, expressions: &naga::Arena<Expression>) -> naga::Block {
+    let mut live = naga::Block::new();
+    for (statement, span) in block.span_into_iter() {
+        match statement {
+            Statement::If { condition, accept, reject } => match constant_condition(condition, expressions) {
+                Some(taken) => live.extend_block(live_block(if taken { accept } else { reject }, expressions)),
+                None => {
+                    let accept = live_block(accept, expressions);
+                    let reject = live_block(reject, expressions);
+                    live.push(Statement::If { condition, accept, reject }, span);
+                }
+            },
+            Statement::Block(inner) => live.push(Statement::Block(live_block(inner, expressions)), span),
+            Statement::Loop { body, continuing, break_if } => {
+                let body = live_block(body, expressions);
+                let continuing = live_block(continuing, expressions);
+                live.push(Statement::Loop { body, continuing, break_if }, span);
+            }
+            Statement::Switch { selector, cases } => {
+                let cases = cases
+                    .into_iter()
+                    .map(|case| naga::SwitchCase { body: live_block(case.body, expressions), ..case })
+                    .collect();
+                live.push(Statement::Switch { selector, cases }, span);
+            }
+            other => live.push(other, span),
+        }
+        // What follows a jump is never reached, and naga rejects it.
+        let jumps = matches!(
+            live.last(),
+            Some(Statement::Return { .. } | Statement::Break | Statement::Continue | Statement::Kill)
+        );
+        if jumps {
+            break;
+        }
+    }
+    live
+}
+
+fn collect_evaluated(block: &naga::Block, evaluated: &mut HashSet<Handle<Expression>>) {
+    for statement in block.iter() {
+        match statement {
+            Statement::Emit(range) => evaluated.extend(range.clone()),
+            Statement::Call { result: Some(result), .. } | Statement::Atomic { result: Some(result), .. } => {
+                evaluated.insert(*result);
+            }
+            Statement::Block(inner) => collect_evaluated(inner, evaluated),
+            Statement::If { accept, reject, .. } => {
+                collect_evaluated(accept, evaluated);
+                collect_evaluated(reject, evaluated);
+            }
+            Statement::Loop { body, continuing, .. } => {
+                collect_evaluated(body, evaluated);
+                collect_evaluated(continuing, evaluated);
+            }
+            Statement::Switch { cases, .. } => {
+                cases.iter().for_each(|case| collect_evaluated(&case.body, evaluated));
+            }
+            _ => {}
+        }
+    }
+}
+
+fn storage_access(access: StorageAccess) -> Access {
+    match (access.contains(StorageAccess::LOAD), access.contains(StorageAccess::STORE)) {
+        (_, false) => Access::Read,
+        (false, true) => Access::Write,
+        (true, true) => Access::ReadWrite,
+    }
+}
+
+fn binding_kind(module: &naga::Module, variable: &naga::GlobalVariable) -> Option<BindingKind> {
+    match (variable.space, &module.types[variable.ty].inner) {
+        (AddressSpace::Uniform, _) => Some(BindingKind::Uniform),
+        (AddressSpace::Storage { access }, _) => Some(BindingKind::StorageBuffer(storage_access(access))),
+        (AddressSpace::Handle, TypeInner::Image { class, .. }) => match *class {
+            ImageClass::Sampled { kind: naga::ScalarKind::Float, multi: false } => Some(BindingKind::TextureFloat),
+            ImageClass::Sampled { kind: naga::ScalarKind::Uint, multi: false } => Some(BindingKind::TextureUint),
+            ImageClass::Storage { format, access: StorageAccess::STORE } => {
+                Format::from_naga(format).map(BindingKind::StorageTexture)
+            }
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+fn reflect(module: &naga::Module) -> Result<Vec<Binding>, String> {
+    let mut bindings = Vec::new();
+    for (_, variable) in module.global_variables.iter() {
+        let Some(at) = &variable.binding else { continue };
+        let name = variable.name.clone().unwrap_or_default();
+        let kind = binding_kind(module, variable)
+            .ok_or_else(|| format!("`{name}` is a kind of resource that limpid's backends do not bind"))?;
+        bindings.push(Binding { name, group: at.group, binding: at.binding, kind });
+    }
+    bindings.sort_by_key(|binding| (binding.group, binding.binding));
+    Ok(bindings)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lined(text: &str) -> Linked {
+        let origins = (1..=text.lines().count()).map(|line| ("test.wgsl".to_owned(), line as u32)).collect();
+        Linked { text: text.to_owned(), origins }
+    }
+
+    const SWITCHED: &str = "
+        override KEEP: bool = false;
+        @group(1) @binding(0) var in_maybe: texture_2d<f32>;
+        @group(1) @binding(1) var out_color: texture_storage_2d<rgba16float, write>;
+        fn maybe(p: vec2<u32>) -> vec4<f32> {
+            if !KEEP { return vec4<f32>(1.0); }
+            let texel = textureLoad(in_maybe, p, 0);
+            return texel;
+        }
+        @compute @workgroup_size(8, 8)
+        fn switched(@builtin(global_invocation_id) id: vec3<u32>) {
+            textureStore(out_color, id.xy, maybe(id.xy));
+        }";
+
+    fn binding_names(keep: f64) -> Vec<String> {
+        let overrides = Overrides::from([("KEEP".to_owned(), keep)]);
+        let kernel = Kernel::from_linked("switched", &lined(SWITCHED), &overrides).unwrap();
+        kernel.bindings.into_iter().map(|binding| binding.name).collect()
+    }
+
+    #[test]
+    fn what_an_override_switches_off_loses_its_binding() {
+        assert_eq!(binding_names(1.0), ["in_maybe", "out_color"]);
+        assert_eq!(binding_names(0.0), ["out_color"]);
+    }
+
+    #[test]
+    fn errors_name_file_and_line() {
+        let broken = lined("@compute @workgroup_size(1)\nfn broken() {\n  let x = nowhere;\n}\n");
+        let report = Kernel::from_linked("broken", &broken, &Overrides::new()).unwrap_err().to_string();
+        assert!(report.contains("test.wgsl:3:"), "{report}");
+        let unknown = Overrides::from([("NO_SUCH".to_owned(), 1.0)]);
+        assert!(Kernel::new("prefilter", &unknown).is_err());
+    }
+
+    #[test]
+    fn every_kernel_is_valid_and_named_after_its_file() {
+        for name in names() {
+            let kernel = Kernel::new(name, &Overrides::new()).unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(kernel.module.entry_points[0].name, name);
+        }
+    }
+
+    #[test]
+    fn kernels_stay_within_webgpu_core() {
+        for name in names() {
+            let kernel = Kernel::new(name, &Overrides::new()).unwrap_or_else(|e| panic!("{e}"));
+            let count = |wanted: fn(&BindingKind) -> bool| kernel.bindings.iter().filter(|b| wanted(&b.kind)).count();
+            assert!(count(|kind| matches!(kind, BindingKind::StorageTexture(_))) <= 4, "{name}");
+            assert!(count(|kind| matches!(kind, BindingKind::StorageBuffer(_))) <= 8, "{name}");
+            let invocations: u32 = kernel.workgroup_size.iter().product();
+            assert!(invocations <= 256, "{name}");
+        }
+    }
+}

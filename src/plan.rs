@@ -1,0 +1,471 @@
+//! The plan: every resource and pass of a denoiser as plain data, for backends to carry out.
+
+use std::fmt;
+
+use glam::UVec2;
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+use crate::frame::check_allocation;
+use crate::kernel::{Kernel, Overrides};
+use crate::resource::{Access, Copy, Count, Extent, Format, Kind, Lifetime, Resource};
+use crate::settings::{Channel, Fallback, NormalEncoding, RaysPerQuad, RoughnessEncoding, Settings};
+
+/// When in the frame a pass runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stage {
+    /// Before the renderer traces its rays.
+    Classify,
+    /// After.
+    Denoise,
+}
+
+/// How many workgroups a pass has.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Grid {
+    /// One.
+    One,
+    /// One for each 8x8 tile of the frame's size.
+    Tiles,
+    /// Three `u32` in a buffer, written on the GPU.
+    Indirect {
+        /// Name of the buffer.
+        resource: String,
+        /// Where in it, in bytes.
+        offset: u64,
+    },
+}
+
+/// A resource bound to a variable of a kernel.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Bound {
+    /// Name of the variable.
+    pub variable: String,
+    /// Bind group: 0 for what the caller supplies, 1 for what limpid owns.
+    pub group: u32,
+    /// Number in the group.
+    pub binding: u32,
+    /// Name of the resource.
+    pub resource: String,
+    /// Which copy of it.
+    pub copy: Copy,
+    /// How the kernel uses it.
+    pub access: Access,
+}
+
+/// One dispatch.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Pass {
+    /// Name of the kernel.
+    pub kernel: String,
+    /// When it runs.
+    pub stage: Stage,
+    /// Values of the kernel's override constants; others keep their defaults.
+    pub overrides: Overrides,
+    /// Workgroups.
+    pub grid: Grid,
+    /// Resources, by group and number.
+    pub bindings: Vec<Bound>,
+}
+
+/// How a resource is used at some point of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Usage {
+    /// By a kernel.
+    Kernel(Access),
+    /// As the grid of a dispatch.
+    Indirect,
+}
+
+impl Usage {
+    fn writes(self) -> bool {
+        matches!(self, Self::Kernel(access) if access.writes())
+    }
+}
+
+/// Synchronisation needed before a pass: the later use must see or must not disturb the earlier one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Barrier {
+    /// Name of the resource.
+    pub resource: String,
+    /// Which copy, named as in this frame.
+    pub copy: Copy,
+    /// The last use before the pass.
+    pub before: Usage,
+    /// The use by the pass.
+    pub after: Usage,
+}
+
+/// Memory that limpid allocates, in bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Memory {
+    /// Kept from frame to frame.
+    pub persistent: u64,
+    /// Needed only while a frame is denoised; may be shared with other work of the caller.
+    pub transient: u64,
+}
+
+impl Memory {
+    /// Both.
+    pub fn total(self) -> u64 {
+        self.persistent + self.transient
+    }
+}
+
+/// Every resource and pass of a denoiser, in the order of execution.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Largest image, in pixels.
+    pub size: UVec2,
+    /// What must be allocated or supplied.
+    pub resources: Vec<Resource>,
+    /// Dispatches in order.
+    pub passes: Vec<Pass>,
+}
+
+/// Name of the texture that holds the denoised radiance.
+pub const OUTPUT: &str = "output";
+
+/// A pass before it is known which of its bindings the specialised kernel keeps.
+struct PassTemplate {
+    kernel: &'static str,
+    stage: Stage,
+    grid: GridTemplate,
+    overrides: &'static [&'static str],
+    bindings: &'static [(&'static str, &'static str, Copy)],
+}
+
+enum GridTemplate {
+    One,
+    Tiles,
+    /// A list of `args`.
+    List(u64),
+}
+
+use Copy::{Current, Previous};
+
+/// The published pipeline. `signal` holds reprojected history this frame (`Current`); last frame's copy is
+/// read for the history length and then holds the prefiltered radiance. `output` is history until it is
+/// written.
+const PASSES: &[PassTemplate] = &[
+    PassTemplate {
+        kernel: "classify",
+        stage: Stage::Classify,
+        grid: GridTemplate::Tiles,
+        overrides: &[
+            "NORMAL_ENCODING",
+            "ROUGHNESS_CHANNEL",
+            "ROUGHNESS_IS_ALPHA",
+            "RAYS_PER_QUAD",
+            "RAYS_FOLLOW_VARIANCE",
+        ],
+        bindings: &[
+            ("in_normal", "normal", Current),
+            ("in_roughness", "roughness", Current),
+            ("in_depth", "depth", Current),
+            ("in_history", OUTPUT, Current),
+            ("out_guide", "guide", Current),
+            ("out_average", "average", Current),
+            ("out_tiles", "tiles", Current),
+            ("out_rays", "rays", Current),
+            ("out_counters", "counters", Current),
+        ],
+    },
+    PassTemplate {
+        kernel: "indirect_args",
+        stage: Stage::Classify,
+        grid: GridTemplate::One,
+        overrides: &[],
+        bindings: &[("inout_counters", "counters", Current), ("out_args", "args", Current)],
+    },
+    PassTemplate {
+        kernel: "reproject",
+        stage: Stage::Denoise,
+        grid: GridTemplate::List(0),
+        overrides: &[],
+        bindings: &[
+            ("in_radiance", "radiance", Current),
+            ("in_motion", "motion", Current),
+            ("in_guide", "guide", Current),
+            ("in_prev_guide", "guide", Previous),
+            ("in_history", OUTPUT, Current),
+            ("in_prev_signal", "signal", Previous),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
+            ("out_reprojected", "signal", Current),
+            ("out_average", "average", Current),
+        ],
+    },
+    PassTemplate {
+        kernel: "prefilter",
+        stage: Stage::Denoise,
+        grid: GridTemplate::List(0),
+        overrides: &[],
+        bindings: &[
+            ("in_radiance", "radiance", Current),
+            ("in_guide", "guide", Current),
+            ("in_reprojected", "signal", Current),
+            ("in_average", "average", Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
+            ("out_prefiltered", "signal", Previous),
+        ],
+    },
+    PassTemplate {
+        kernel: "fill",
+        stage: Stage::Denoise,
+        grid: GridTemplate::List(1),
+        overrides: &["FALLBACK"],
+        bindings: &[
+            ("in_radiance", "radiance", Current),
+            ("in_environment", "environment", Current),
+            ("in_guide", "guide", Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
+            ("out_output", OUTPUT, Current),
+        ],
+    },
+    PassTemplate {
+        kernel: "resolve_temporal",
+        stage: Stage::Denoise,
+        grid: GridTemplate::List(0),
+        overrides: &["FALLBACK"],
+        bindings: &[
+            ("in_radiance", "radiance", Current),
+            ("in_environment", "environment", Current),
+            ("in_guide", "guide", Current),
+            ("in_reprojected", "signal", Current),
+            ("in_prefiltered", "signal", Previous),
+            ("in_average", "average", Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
+            ("out_output", OUTPUT, Current),
+        ],
+    },
+];
+
+/// All resources that passes can name.
+fn all_resources() -> Vec<Resource> {
+    let resource =
+        |name: &str, kind, lifetime, ping_pong| Resource { name: name.to_owned(), kind, lifetime, ping_pong };
+    let texture = |format, extent| Kind::Texture { format, extent };
+    let buffer = |stride, count, indirect| Kind::Buffer { stride, count, indirect };
+    let input = |name| resource(name, Kind::Input, Lifetime::External, false);
+    vec![
+        resource("frame", Kind::Constants, Lifetime::External, false),
+        input("radiance"),
+        input("normal"),
+        input("roughness"),
+        input("depth"),
+        input("motion"),
+        input("environment"),
+        resource("guide", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
+        resource("signal", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
+        resource(OUTPUT, texture(Format::Rgba16Float, Extent::Full), Lifetime::Persistent, false),
+        resource("average", texture(Format::Rgba16Float, Extent::Tile), Lifetime::Transient, false),
+        resource("tiles", buffer(4, Count::Per(Extent::Tile), false), Lifetime::Transient, false),
+        resource("rays", buffer(4, Count::Per(Extent::Full), false), Lifetime::Transient, false),
+        resource("counters", buffer(4, Count::Fixed(4), false), Lifetime::Persistent, false),
+        resource("args", buffer(16, Count::Fixed(3), true), Lifetime::Transient, false),
+    ]
+}
+
+/// Index in `args` of the rays' grid.
+pub(crate) const RAY_ARGS: u64 = 2;
+/// Bytes of one entry of `args`: workgroups in x, y and z, and the length of the list.
+pub(crate) const ARGS_STRIDE: u64 = 16;
+
+fn override_value(settings: &Settings, name: &str) -> f64 {
+    let ray_list = settings.coverage.ray_list.as_ref();
+    match name {
+        "NORMAL_ENCODING" => match settings.conventions.normal {
+            NormalEncoding::Signed => 0.0,
+            NormalEncoding::Unsigned => 1.0,
+            NormalEncoding::Octahedral => 2.0,
+            NormalEncoding::OctahedralUnsigned => 3.0,
+        },
+        "ROUGHNESS_CHANNEL" => match settings.conventions.roughness_channel {
+            Channel::Red => 0.0,
+            Channel::Green => 1.0,
+            Channel::Blue => 2.0,
+            Channel::Alpha => 3.0,
+        },
+        "ROUGHNESS_IS_ALPHA" => f64::from(settings.conventions.roughness == RoughnessEncoding::Alpha),
+        "RAYS_PER_QUAD" => match ray_list.map(|list| list.rays_per_quad) {
+            None => 0.0,
+            Some(RaysPerQuad::One) => 1.0,
+            Some(RaysPerQuad::Two) => 2.0,
+            Some(RaysPerQuad::Four) => 4.0,
+        },
+        "RAYS_FOLLOW_VARIANCE" => f64::from(ray_list.is_some_and(|list| list.variance_threshold.is_some())),
+        "FALLBACK" => match settings.coverage.fallback {
+            Fallback::Black => 0.0,
+            Fallback::Input => 1.0,
+            Fallback::Environment => 2.0,
+        },
+        _ => unreachable!("templates name no other override"),
+    }
+}
+
+fn plan_pass(template: &PassTemplate, settings: &Settings) -> Result<(Pass, Kernel), Error> {
+    let overrides: Overrides =
+        template.overrides.iter().map(|&name| (name.to_owned(), override_value(settings, name))).collect();
+    let kernel = Kernel::new(template.kernel, &overrides)?;
+    let mut bindings = Vec::new();
+    for binding in &kernel.bindings {
+        let (resource, copy) = template
+            .bindings
+            .iter()
+            .find(|(variable, ..)| *variable == binding.name)
+            .map(|&(_, resource, copy)| (resource, copy))
+            .or((binding.name == "frame").then_some(("frame", Current)))
+            .ok_or_else(|| Error::Kernel {
+                kernel: template.kernel,
+                stage: "plan",
+                report: format!("no resource is known for `{}`", binding.name),
+            })?;
+        bindings.push(Bound {
+            variable: binding.name.clone(),
+            group: binding.group,
+            binding: binding.binding,
+            resource: resource.to_owned(),
+            copy,
+            access: binding.kind.access(),
+        });
+    }
+    let grid = match template.grid {
+        GridTemplate::One => Grid::One,
+        GridTemplate::Tiles => Grid::Tiles,
+        GridTemplate::List(index) => Grid::Indirect { resource: "args".to_owned(), offset: index * ARGS_STRIDE },
+    };
+    let pass = Pass { kernel: template.kernel.to_owned(), stage: template.stage, overrides, grid, bindings };
+    Ok((pass, kernel))
+}
+
+impl Plan {
+    /// The plan for `settings`, for images of up to `size` pixels, and the kernel of each pass.
+    ///
+    /// Resources that no kernel uses after specialisation are not part of it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Setting`] and [`Error::Size`]; [`Error::Kernel`] would be a defect of limpid.
+    pub fn new(settings: &Settings, size: UVec2) -> Result<(Self, Vec<Kernel>), Error> {
+        settings.validate()?;
+        check_allocation(size)?;
+        let mut passes = Vec::new();
+        let mut kernels = Vec::new();
+        for template in PASSES {
+            let (pass, kernel) = plan_pass(template, settings)?;
+            passes.push(pass);
+            kernels.push(kernel);
+        }
+        let is_used = |name: &str| {
+            passes.iter().any(|pass| {
+                let indirect = matches!(&pass.grid, Grid::Indirect { resource, .. } if resource == name);
+                indirect || pass.bindings.iter().any(|bound| bound.resource == name)
+            })
+        };
+        let resources = all_resources().into_iter().filter(|resource| is_used(&resource.name)).collect();
+        Ok((Self { size, resources, passes }, kernels))
+    }
+
+    /// The resource of that name.
+    pub fn resource(&self, name: &str) -> Option<&Resource> {
+        self.resources.iter().find(|resource| resource.name == name)
+    }
+
+    /// Names of the images that the caller has to supply.
+    pub fn inputs(&self) -> impl Iterator<Item = &str> {
+        self.resources.iter().filter(|resource| resource.kind == Kind::Input).map(|resource| resource.name.as_str())
+    }
+
+    /// Memory that limpid allocates, without aliasing.
+    pub fn memory(&self) -> Memory {
+        let bytes =
+            |lifetime| self.resources.iter().filter(|r| r.lifetime == lifetime).map(|r| r.bytes(self.size)).sum();
+        Memory { persistent: bytes(Lifetime::Persistent), transient: bytes(Lifetime::Transient) }
+    }
+
+    /// Allocated bytes for each pixel.
+    pub fn bytes_per_pixel(&self) -> f64 {
+        self.memory().total() as f64 / (f64::from(self.size.x) * f64::from(self.size.y))
+    }
+
+    /// Synchronisation before each pass, in a frame that follows another one.
+    ///
+    /// Between uses that only read there is none, whatever the backend has to do about image layouts.
+    pub fn barriers(&self) -> Vec<Vec<Barrier>> {
+        let mut last_use: Vec<[Option<Usage>; 2]> = vec![[None; 2]; self.resources.len()];
+        let mut barriers = Vec::new();
+        // The first frame only leaves behind what the second one has to wait for.
+        for phase in [0, 1] {
+            barriers = self.passes.iter().map(|pass| self.pass_barriers(pass, phase, &mut last_use)).collect();
+        }
+        barriers
+    }
+
+    fn pass_barriers(&self, pass: &Pass, phase: usize, last_use: &mut [[Option<Usage>; 2]]) -> Vec<Barrier> {
+        let bound = pass.bindings.iter().map(|b| (b.resource.as_str(), b.copy, Usage::Kernel(b.access)));
+        let indirect = match &pass.grid {
+            Grid::Indirect { resource, .. } => Some((resource.as_str(), Current, Usage::Indirect)),
+            Grid::One | Grid::Tiles => None,
+        };
+        let mut barriers = Vec::new();
+        for (name, copy, after) in bound.chain(indirect) {
+            let Some(index) = self.resources.iter().position(|resource| resource.name == name) else { continue };
+            if self.resources[index].lifetime == Lifetime::External {
+                continue;
+            }
+            let slot = &mut last_use[index][copy.index(self.resources[index].ping_pong, phase)];
+            if let Some(before) = slot.filter(|before| before.writes() || after.writes()) {
+                barriers.push(Barrier { resource: name.to_owned(), copy, before, after });
+            }
+            // A read does not hide an earlier write that other reads have to wait for as well, but their
+            // barrier was this one.
+            *slot = Some(after);
+        }
+        barriers
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}x{}, {:.2} bytes per pixel", self.size.x, self.size.y, self.bytes_per_pixel())?;
+        for resource in &self.resources {
+            let kind = match resource.kind {
+                Kind::Constants => "constants".to_owned(),
+                Kind::Input => "input".to_owned(),
+                Kind::Texture { format, extent } => format!("{format:?} {extent:?}"),
+                Kind::Buffer { stride, count, .. } => format!("{} x {stride} bytes", count.of(self.size)),
+            };
+            let pair = if resource.ping_pong { " pair" } else { "" };
+            writeln!(f, "  {:<12}{:?} {kind}{pair}", resource.name, resource.lifetime)?;
+        }
+        for pass in &self.passes {
+            let grid = match &pass.grid {
+                Grid::One => "one workgroup".to_owned(),
+                Grid::Tiles => "a workgroup per tile".to_owned(),
+                Grid::Indirect { resource, offset } => format!("indirect from {resource} + {offset}"),
+            };
+            writeln!(f, "{} ({:?}), {grid}", pass.kernel, pass.stage)?;
+            for bound in &pass.bindings {
+                let arrow = match bound.access {
+                    Access::Read => "<-",
+                    Access::Write => "->",
+                    Access::ReadWrite => "<>",
+                };
+                let copy = if bound.copy == Previous { ", last frame's" } else { "" };
+                writeln!(
+                    f,
+                    "  {}.{} {:<16}{arrow} {}{copy}",
+                    bound.group, bound.binding, bound.variable, bound.resource
+                )?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,372 @@
+//! Everything that can be chosen: conventions of the caller's data, coverage, and the constants of each pass.
+
+use glam::{Mat3, Vec2};
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+
+/// A named set of settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Preset {
+    /// The pipeline that AMD published in 2021, with the constants it was published with.
+    Reference,
+}
+
+impl Preset {
+    /// All presets, with the names that the command line uses.
+    pub const ALL: &[(&str, Preset)] = &[("reference", Preset::Reference)];
+
+    /// The settings that the preset stands for.
+    pub fn settings(self) -> Settings {
+        match self {
+            Preset::Reference => Settings::default(),
+        }
+    }
+}
+
+/// How the caller's `depth` is to be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DepthEncoding {
+    /// Depth buffer, 0 at the near plane, 1 at the far plane (which may be infinite). 1 is sky.
+    #[default]
+    Device,
+    /// Depth buffer, 1 at the near plane, 0 at the far plane (which may be infinite). 0 is sky.
+    ReversedDevice,
+    /// Distance along the view direction in world units, positive. 0 or less is sky.
+    Linear,
+}
+
+/// How the caller's `normal` is to be read. Normals are in world space and need not have unit length.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NormalEncoding {
+    /// `xyz` as they are, from a float or snorm format.
+    #[default]
+    Signed,
+    /// `xyz * 2 - 1`, from a unorm format.
+    Unsigned,
+    /// Octahedral map in `xy`, -1 to 1.
+    Octahedral,
+    /// Octahedral map in `xy`, 0 to 1.
+    OctahedralUnsigned,
+}
+
+/// How the caller's `roughness` is to be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RoughnessEncoding {
+    /// Perceptual roughness, the square root of GGX alpha.
+    #[default]
+    Perceptual,
+    /// GGX alpha.
+    Alpha,
+}
+
+/// Channel of a texture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Channel {
+    /// First.
+    #[default]
+    Red,
+    /// Second.
+    Green,
+    /// Third.
+    Blue,
+    /// Fourth.
+    Alpha,
+}
+
+/// Direction of `y` in normalised device coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NdcY {
+    /// Up, as in Direct3D, Metal and WebGPU.
+    #[default]
+    Up,
+    /// Down, as in Vulkan with a viewport of positive height.
+    Down,
+}
+
+/// How the caller's data is encoded. See the crate documentation for spaces and signs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Conventions {
+    /// Encoding of `depth`.
+    pub depth: DepthEncoding,
+    /// Linear depth from which a pixel is sky, in world units, above 0. Only for [`DepthEncoding::Linear`].
+    pub sky_distance: f32,
+    /// Encoding of `normal`.
+    pub normal: NormalEncoding,
+    /// Encoding of `roughness`.
+    pub roughness: RoughnessEncoding,
+    /// Channel of the `roughness` texture that holds it.
+    pub roughness_channel: Channel,
+    /// Factor from the caller's `motion` to `uv_now - uv_before`, uv with its origin at the top left and `y`
+    /// down. `(1, 1)` for exactly that; `(0.5, -0.5)` for `ndc_now - ndc_before`; `(-1, -1)` for vectors that
+    /// point to where the surface was; `1 / size` for vectors in pixels.
+    pub motion_scale: Vec2,
+    /// Whether `motion` contains the difference of the two frames' jitter.
+    pub motion_includes_jitter: bool,
+    /// Direction of `y` in clip space.
+    pub ndc_y: NdcY,
+}
+
+impl Default for Conventions {
+    fn default() -> Self {
+        Self {
+            depth: DepthEncoding::default(),
+            sky_distance: f32::MAX,
+            normal: NormalEncoding::default(),
+            roughness: RoughnessEncoding::default(),
+            roughness_channel: Channel::default(),
+            motion_scale: Vec2::ONE,
+            motion_includes_jitter: false,
+            ndc_y: NdcY::default(),
+        }
+    }
+}
+
+/// What a pixel holds in the output that is left out: sky, or rougher than the threshold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fallback {
+    /// No radiance.
+    Black,
+    /// The noisy input as it is.
+    #[default]
+    Input,
+    /// Black in the sky; elsewhere the `environment` input in the mirror direction, blurred by roughness.
+    Environment,
+}
+
+/// Share of pixels that the renderer traces a ray for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RaysPerQuad {
+    /// One ray for each 2x2 pixels.
+    One,
+    /// Two rays on the diagonal of each 2x2 pixels.
+    Two,
+    /// A ray for every pixel that reflects.
+    #[default]
+    Four,
+}
+
+/// The list of rays that the classify pass makes for the renderer.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
+pub struct RayList {
+    /// Rays in each quad. Mirrors always get one of their own.
+    pub rays_per_quad: RaysPerQuad,
+    /// Pixels whose variance in the last output was above this, 0 to 1, get a ray of their own.
+    /// `None` leaves the check out.
+    pub variance_threshold: Option<f32>,
+}
+
+/// Which pixels are denoised and what the others get.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Coverage {
+    /// Roughest surface that is denoised: perceptual roughness, 0 to 1. The published value is GGX alpha 0.2.
+    pub roughness_threshold: f32,
+    /// Surfaces up to this perceptual roughness, 0 to 1, count as mirrors: their rays hold no noise of the
+    /// lobe, so the prefilter leaves them alone.
+    pub mirror_roughness: f32,
+    /// Output of pixels that are left out.
+    pub fallback: Fallback,
+    /// Level of the environment map's mip chain at GGX alpha 1, 0 to 16. Only for [`Fallback::Environment`].
+    pub environment_mip_scale: f32,
+    /// Rotation from world space into the axes of the environment map (equirectangular, `y` up, `-z` at the
+    /// centre). Only for [`Fallback::Environment`].
+    pub environment_from_world: Mat3,
+    /// Makes a list of the rays to trace. `None`: the renderer traces every pixel.
+    pub ray_list: Option<RayList>,
+}
+
+impl Default for Coverage {
+    fn default() -> Self {
+        Self {
+            roughness_threshold: 0.447_213_6,
+            mirror_roughness: 0.01,
+            fallback: Fallback::default(),
+            environment_mip_scale: 9.0,
+            environment_from_world: Mat3::IDENTITY,
+            ray_list: None,
+        }
+    }
+}
+
+/// Declares a group of numeric settings: documentation, name, default, range.
+macro_rules! numeric_settings {
+    ($(#[$outer:meta])* $group:ident in $path:literal {
+        $($(#[$doc:meta])* $field:ident = $default:literal, $low:literal to $high:literal;)*
+    }) => {
+        $(#[$outer])*
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        #[non_exhaustive]
+        pub struct $group {
+            $($(#[$doc])*
+            #[doc = concat!("\n\nRange ", $low, " to ", $high, ", published value ", $default, ".")]
+            pub $field: f32,)*
+        }
+
+        impl Default for $group {
+            fn default() -> Self {
+                Self { $($field: $default,)* }
+            }
+        }
+
+        impl $group {
+            fn validate(&self) -> Result<(), Error> {
+                $(check_range(concat!($path, ".", stringify!($field)), self.$field, $low, $high,
+                    concat!($low, " to ", $high))?;)*
+                Ok(())
+            }
+        }
+    };
+}
+
+numeric_settings! {
+    /// Constants of the reproject pass. Colours are exposed radiance.
+    Reproject in "reproject" {
+        /// How fast the Gaussian of the 9x9 neighbourhood falls: the weight at `i` pixels is
+        /// `exp(-falloff * i * i / 25)`.
+        neighborhood_falloff = 3.0, 0.0 to 100.0;
+        /// Cosine between a pixel's normal and last frame's normal at its mirror-parallax position from which
+        /// that position may be taken.
+        parallax_normal_cosine = 0.9999, -1.0 to 1.0;
+        /// By how much that cosine may be below the one at the surface-motion position.
+        parallax_normal_margin = 0.001, 0.0 to 2.0;
+        /// By how much GGX alpha may fit worse there than at the surface-motion position.
+        parallax_roughness_margin = 0.001, 0.0 to 1.0;
+        /// Squared distance of surface-motion history to the neighbourhood's mean, as a multiple of the
+        /// length of its variance, from which that history is dropped.
+        surface_color_gate = 1.5, 0.0 to 10000.0;
+        /// How much one minus the cosine between normals lowers the trust in history, as an exponent.
+        disocclusion_normal_falloff = 1.4, 0.0 to 1000.0;
+        /// How much relative difference of depth lowers the trust in history, as an exponent.
+        disocclusion_depth_falloff = 1.0, 0.0 to 1000.0;
+        /// Trust, 0 to 1, below which there is no history.
+        disocclusion_threshold = 0.9, 0.0 to 1.0;
+        /// The same for single texels at edges, as a fraction of the threshold.
+        disocclusion_tap_fraction = 0.5, 0.0 to 1.0;
+        /// Longest history on rough surfaces, in frames.
+        max_history = 32.0, 1.0 to 255.0;
+        /// Longest history on mirrors, in frames, not above `max_history`.
+        min_history_cap = 8.0, 1.0 to 255.0;
+        /// How fast the longest history grows with GGX alpha, as an exponent.
+        history_roughness_falloff = 100.0, 0.0 to 100000.0;
+        /// Luminance below which differences count as absolute, not relative.
+        variance_luminance_floor = 0.5, 0.000001 to 65504.0;
+        /// Share of history in the 8x8 average.
+        average_history_blend = 0.3, 0.0 to 1.0;
+        /// How much luminance lowers a pixel's weight in the 8x8 average, as an exponent. Above 0 it darkens.
+        average_luminance_falloff = 0.3, 0.0 to 1000.0;
+        /// Smallest weight in the 8x8 average.
+        average_weight_floor = 0.01, 0.000001 to 1.0;
+    }
+}
+
+numeric_settings! {
+    /// Constants of the prefilter pass.
+    Prefilter in "prefilter" {
+        /// How much distance to the 8x8 average lowers a tap's weight, as an exponent. Above 0 it darkens.
+        radiance_falloff = 0.6, 0.0 to 1000.0;
+        /// What a variance of 1 adds to that.
+        radiance_variance_falloff = 0.1, 0.0 to 1000.0;
+        /// Smallest weight by radiance.
+        radiance_weight_floor = 0.01, 0.000001 to 1.0;
+        /// Power of the cosine between normals.
+        normal_power = 512.0, 0.0 to 65536.0;
+        /// How much depth difference times depth lowers a tap's weight, as an exponent, per square world unit
+        /// (tuned for metres).
+        depth_falloff = 4.0, 0.0 to 1000000000000.0;
+        /// How fast the weight of neighbours grows with a pixel's variance, as an exponent.
+        variance_falloff = 4.4, 0.0 to 1000.0;
+        /// Smallest weight of neighbours by variance.
+        variance_weight_floor = 0.1, 0.0 to 1.0;
+    }
+}
+
+numeric_settings! {
+    /// Constants of the temporal resolve pass.
+    Resolve in "resolve" {
+        /// Size of the box that history is clipped to: 0 is responsive and noisy, 1 stable and slow.
+        stability = 0.7, 0.0 to 1.0;
+        /// Factor on that size.
+        clip_scale = 1.4, 0.0 to 1000.0;
+        /// How far the box moves from the neighbourhood's mean to the 8x8 average.
+        clip_average_pull = 0.2, 0.0 to 1.0;
+        /// Smallest half size of the box, in exposed radiance.
+        clip_extent_floor = 0.001, 0.000001 to 65504.0;
+    }
+}
+
+/// Everything that can be chosen. `Default` is the recommendation.
+///
+/// Settings can be read from TOML or JSON; whatever is not named keeps its default.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Settings {
+    /// Encodings of the caller's data.
+    pub conventions: Conventions,
+    /// Which pixels are denoised.
+    pub coverage: Coverage,
+    /// Constants of the reproject pass.
+    pub reproject: Reproject,
+    /// Constants of the prefilter pass.
+    pub prefilter: Prefilter,
+    /// Constants of the temporal resolve pass.
+    pub resolve: Resolve,
+}
+
+fn check_range(field: &'static str, value: f32, low: f32, high: f32, expected: &'static str) -> Result<(), Error> {
+    // Not a number fails both comparisons.
+    if value >= low && value <= high { Ok(()) } else { Err(Error::Setting { field, value, expected }) }
+}
+
+impl Settings {
+    /// Checks every number against its documented range.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Setting`] for the first one outside.
+    pub fn validate(&self) -> Result<(), Error> {
+        self.reproject.validate()?;
+        self.prefilter.validate()?;
+        self.resolve.validate()?;
+        let coverage = &self.coverage;
+        let unit = "0 to 1";
+        check_range("coverage.roughness_threshold", coverage.roughness_threshold, 0.0, 1.0, unit)?;
+        check_range("coverage.mirror_roughness", coverage.mirror_roughness, 0.0, 1.0, unit)?;
+        check_range("coverage.environment_mip_scale", coverage.environment_mip_scale, 0.0, 16.0, "0 to 16")?;
+        for value in coverage.environment_from_world.to_cols_array() {
+            check_range("coverage.environment_from_world", value, -1.001, 1.001, "a rotation")?;
+        }
+        if let Some(threshold) = coverage.ray_list.as_ref().and_then(|list| list.variance_threshold) {
+            check_range("coverage.ray_list.variance_threshold", threshold, 0.0, 1.0, unit)?;
+        }
+        if self.reproject.min_history_cap > self.reproject.max_history {
+            return Err(Error::Setting {
+                field: "reproject.min_history_cap",
+                value: self.reproject.min_history_cap,
+                expected: "at most reproject.max_history",
+            });
+        }
+        let conventions = &self.conventions;
+        check_range("conventions.sky_distance", conventions.sky_distance, f32::MIN_POSITIVE, f32::MAX, "above 0")?;
+        for scale in conventions.motion_scale.to_array() {
+            check_range("conventions.motion_scale", scale, f32::MIN, f32::MAX, "a finite number")?;
+        }
+        Ok(())
+    }
+}
