@@ -115,6 +115,7 @@ constants! {
         clip_extent_floor: f32,
         history_length_steps: f32,
         padding: f32,
+        padding_to_16_bytes: [f32; 2],
     }
 }
 
@@ -309,5 +310,6 @@ pub(crate) fn constants(
         clip_extent_floor: resolve.clip_extent_floor,
         history_length_steps: (255.0 / reproject.max_history).floor(),
         padding: 0.0,
+        padding_to_16_bytes: [0.0; 2],
     })
 }

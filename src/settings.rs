@@ -10,18 +10,26 @@ use crate::Error;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Preset {
+    /// The recommendation: at present the published pipeline for surfaces of every roughness.
+    Default,
     /// The pipeline that AMD published in 2021, with the constants it was published with.
     Reference,
 }
 
 impl Preset {
     /// All presets, with the names that the command line uses.
-    pub const ALL: &[(&str, Preset)] = &[("reference", Preset::Reference)];
+    pub const ALL: &[(&str, Preset)] = &[("default", Preset::Default), ("reference", Preset::Reference)];
 
     /// The settings that the preset stands for.
     pub fn settings(self) -> Settings {
         match self {
-            Preset::Reference => Settings::default(),
+            Preset::Default => Settings::default(),
+            Preset::Reference => {
+                let mut settings = Settings::default();
+                // GGX alpha 0.2.
+                settings.coverage.roughness_threshold = 0.447_213_6;
+                settings
+            }
         }
     }
 }
@@ -174,7 +182,8 @@ pub struct RayList {
 #[serde(default, deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Coverage {
-    /// Roughest surface that is denoised: perceptual roughness, 0 to 1. The published value is GGX alpha 0.2.
+    /// Roughest surface that is denoised: perceptual roughness, 0 to 1. 1 denoises all; the published value is
+    /// 0.4472, GGX alpha 0.2.
     pub roughness_threshold: f32,
     /// Surfaces up to this perceptual roughness, 0 to 1, count as mirrors: their rays hold no noise of the
     /// lobe, so the prefilter leaves them alone.
@@ -193,7 +202,7 @@ pub struct Coverage {
 impl Default for Coverage {
     fn default() -> Self {
         Self {
-            roughness_threshold: 0.447_213_6,
+            roughness_threshold: 1.0,
             mirror_roughness: 0.01,
             fallback: Fallback::default(),
             environment_mip_scale: 9.0,

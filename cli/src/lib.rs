@@ -1,1 +1,11 @@
-//! x
+//! What the `limpid` command is made of: sequences on disk, built-in scenes, metrics, pictures, and the
+//! backends that denoise.
+
+#![forbid(unsafe_code)]
+
+pub mod backend;
+pub mod commands;
+pub mod metrics;
+pub mod picture;
+pub mod scene;
+pub mod sequence;

@@ -63,6 +63,7 @@ struct Frame {
     // Steps per frame in which a history length is stored, a whole number.
     history_length_steps: f32,
     padding: f32,
+    padding_to_16_bytes: vec2<f32>,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -1,0 +1,264 @@
+//! The wgpu backend: uploads a frame, records, submits, reads back.
+
+use std::sync::mpsc;
+use std::time::Duration;
+
+use anyhow::{Context, Result, anyhow};
+use glam::UVec2;
+use half::f16;
+use limpid::settings::DepthEncoding;
+use limpid::{FrameInputs, Plan, Settings};
+use limpid_wgpu::{Denoiser, Inputs, Options, PassTime};
+
+use super::{Backend, Denoised, ListedRay, Tracer, trace_listed};
+use crate::sequence::Frame;
+
+/// An input image on the device.
+struct Image {
+    texture: wgpu::Texture,
+    view: wgpu::TextureView,
+}
+
+/// The images of a frame.
+struct Images {
+    radiance: Image,
+    normal: Image,
+    roughness: Image,
+    depth: Image,
+    motion: Image,
+}
+
+pub(super) struct Gpu {
+    description: String,
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    denoiser: Denoiser,
+    images: Images,
+}
+
+const NO_DEVICE: &str = "no Vulkan, Metal or Direct3D 12 device was found. On Linux without a GPU install a software \
+                         Vulkan driver (Debian and Ubuntu: apt-get install mesa-vulkan-drivers)";
+
+fn open_device() -> Result<(String, wgpu::Device, wgpu::Queue)> {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    // Grids come from limpid's own kernels, so checking them before each dispatch would only distort times.
+    descriptor.flags = wgpu::InstanceFlags::empty();
+    let instance = wgpu::Instance::new(descriptor);
+    let options =
+        wgpu::RequestAdapterOptions { power_preference: wgpu::PowerPreference::HighPerformance, ..Default::default() };
+    let adapter = pollster::block_on(instance.request_adapter(&options)).context(NO_DEVICE)?;
+    let info = adapter.get_info();
+    let available = adapter.limits();
+    let device_descriptor = wgpu::DeviceDescriptor {
+        label: Some("limpid"),
+        required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+        // Beyond the defaults only what large images need.
+        required_limits: wgpu::Limits {
+            max_texture_dimension_2d: available.max_texture_dimension_2d,
+            max_buffer_size: available.max_buffer_size,
+            max_storage_buffer_binding_size: available.max_storage_buffer_binding_size,
+            ..Default::default()
+        },
+        ..Default::default()
+    };
+    let (device, queue) = pollster::block_on(adapter.request_device(&device_descriptor))
+        .with_context(|| format!("cannot open {} ({:?})", info.name, info.backend))?;
+    let kind = match info.device_type {
+        wgpu::DeviceType::Cpu => "software, on the CPU",
+        wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+        wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+        wgpu::DeviceType::VirtualGpu | wgpu::DeviceType::Other => "unknown kind",
+    };
+    Ok((format!("{} through wgpu and {:?} ({kind})", info.name, info.backend), device, queue))
+}
+
+fn image(device: &wgpu::Device, name: &str, size: UVec2, format: wgpu::TextureFormat) -> Image {
+    let texture = device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(name),
+        size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+        view_formats: &[],
+    });
+    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+    Image { texture, view }
+}
+
+impl Images {
+    fn new(device: &wgpu::Device, size: UVec2) -> Self {
+        use wgpu::TextureFormat::{R32Float, Rg32Float, Rgba16Float, Rgba32Float};
+        Self {
+            radiance: image(device, "radiance", size, Rgba16Float),
+            normal: image(device, "normal", size, Rgba32Float),
+            roughness: image(device, "roughness", size, R32Float),
+            depth: image(device, "depth", size, R32Float),
+            motion: image(device, "motion", size, Rg32Float),
+        }
+    }
+
+    fn inputs(&self) -> Inputs<'_> {
+        Inputs {
+            radiance: &self.radiance.view,
+            normal: &self.normal.view,
+            roughness: &self.roughness.view,
+            depth: &self.depth.view,
+            motion: &self.motion.view,
+            environment: None,
+        }
+    }
+}
+
+/// Half floats, with finite numbers that are too large as the largest there is.
+fn to_half(value: f32) -> f16 {
+    let clamped = if value.is_finite() { value.clamp(-65504.0, 65504.0) } else { value };
+    f16::from_f32(clamped)
+}
+
+impl Gpu {
+    pub(super) fn open(settings: &Settings, size: UVec2) -> Result<Self> {
+        // Sequences hold linear depth.
+        let mut settings = settings.clone();
+        settings.conventions.depth = DepthEncoding::Linear;
+        let (description, device, queue) = open_device()?;
+        let timestamps = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+        let options = Options { timestamps, ..Default::default() };
+        let denoiser = Denoiser::new(&device, &settings, size, options)?;
+        let images = Images::new(&device, size);
+        Ok(Self { description, device, queue, denoiser, images })
+    }
+
+    fn upload<T: bytemuck::NoUninit>(&self, image: &Image, size: UVec2, texels: &[T]) {
+        self.queue.write_texture(
+            image.texture.as_image_copy(),
+            bytemuck::cast_slice(texels),
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(size.x * size_of::<T>() as u32),
+                rows_per_image: None,
+            },
+            wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+        );
+    }
+
+    fn upload_radiance(&self, size: UVec2, radiance: &[[f32; 4]]) {
+        let halves: Vec<[f16; 4]> = radiance.iter().map(|texel| texel.map(to_half)).collect();
+        self.upload(&self.images.radiance, size, &halves);
+    }
+
+    fn upload_gbuffer(&self, frame: &Frame) {
+        let normals: Vec<[f32; 4]> = frame.normal.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect();
+        self.upload(&self.images.normal, frame.size, &normals);
+        self.upload(&self.images.roughness, frame.size, &frame.roughness);
+        self.upload(&self.images.depth, frame.size, &frame.depth);
+        self.upload(&self.images.motion, frame.size, &frame.motion);
+    }
+
+    fn readback_buffer(&self, size: u64) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("readback"),
+            size,
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        })
+    }
+
+    fn wait(&self) -> Result<()> {
+        self.device.poll(wgpu::PollType::wait_indefinitely()).context("the device was lost")?;
+        Ok(())
+    }
+
+    /// Waits for everything submitted and returns the content of a readback buffer.
+    fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>> {
+        let (sender, receiver) = mpsc::channel();
+        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+            // Nobody listens any more once waiting has failed.
+            let _ = sender.send(result);
+        });
+        self.wait()?;
+        receiver.recv().context("the device did not answer")?.context("cannot read back from the device")?;
+        let bytes = buffer.get_mapped_range(..).map_err(|e| anyhow!("cannot read back from the device: {e}"))?.to_vec();
+        buffer.unmap();
+        Ok(bytes)
+    }
+
+    fn classified_rays(&self, encoder: wgpu::CommandEncoder) -> Result<Vec<ListedRay>> {
+        let list = self.denoiser.ray_list().context("the settings ask for no ray list")?;
+        let mut encoder = encoder;
+        let rays = self.readback_buffer(list.rays.size());
+        let count = self.readback_buffer(4);
+        encoder.copy_buffer_to_buffer(list.rays, 0, &rays, 0, rays.size());
+        encoder.copy_buffer_to_buffer(list.args, list.args_offset + 12, &count, 0, 4);
+        self.queue.submit([encoder.finish()]);
+        let count: Vec<u32> = bytemuck::pod_collect_to_vec(&self.read(&count)?);
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&self.read(&rays)?);
+        Ok(words.into_iter().take(count[0] as usize).map(ListedRay::unpack).collect())
+    }
+
+    fn read_output(&self, mut encoder: wgpu::CommandEncoder, size: UVec2) -> Result<Vec<[f32; 3]>> {
+        let row = (size.x * 8).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = self.readback_buffer(u64::from(row) * u64::from(size.y));
+        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None };
+        encoder.copy_texture_to_buffer(
+            self.denoiser.output_texture().as_image_copy(),
+            wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
+            wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+        );
+        self.queue.submit([encoder.finish()]);
+        let bytes = self.read(&buffer)?;
+        let mut radiance = Vec::with_capacity((size.x * size.y) as usize);
+        for row in bytes.chunks_exact(row as usize) {
+            let halves: Vec<[f16; 4]> = bytemuck::pod_collect_to_vec(&row[..size.x as usize * 8]);
+            radiance.extend(halves.iter().map(|&[r, g, b, _]| [r.to_f32(), g.to_f32(), b.to_f32()]));
+        }
+        Ok(radiance)
+    }
+
+    fn read_times(&self) -> Result<Vec<(String, Duration)>> {
+        let (sender, receiver) = mpsc::channel();
+        self.denoiser.read_times(move |times: Vec<PassTime>| {
+            // Nobody listens any more once waiting has failed.
+            let _ = sender.send(times);
+        });
+        self.wait()?;
+        let times = receiver.try_recv().unwrap_or_default();
+        Ok(times.into_iter().map(|time| (time.kernel, time.duration)).collect())
+    }
+}
+
+impl Backend for Gpu {
+    fn device(&self) -> &str {
+        &self.description
+    }
+
+    fn plan(&self) -> &Plan {
+        self.denoiser.plan()
+    }
+
+    fn denoise(&mut self, frame: &Frame, exposure: f32, tracer: Option<Tracer<'_>>) -> Result<Denoised> {
+        let mut inputs = FrameInputs::new(frame.camera, frame.size);
+        inputs.reset = frame.reset;
+        inputs.exposure = exposure;
+        self.upload_gbuffer(frame);
+        if tracer.is_none() {
+            self.upload_radiance(frame.size, &frame.radiance);
+        }
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.denoiser.encode_classify(&self.queue, &mut encoder, &self.images.inputs(), &inputs)?;
+        let mut rays = frame.depth.iter().filter(|depth| **depth > 0.0).count() as u64;
+        let mut traced = None;
+        if let Some(tracer) = tracer {
+            let listed = self.classified_rays(encoder)?;
+            rays = listed.len() as u64;
+            let radiance = trace_listed(&listed, frame.size, tracer);
+            self.upload_radiance(frame.size, &radiance);
+            traced = Some(radiance);
+            encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        }
+        self.denoiser.encode_denoise(&mut encoder, &self.images.inputs())?;
+        let radiance = self.read_output(encoder, frame.size)?;
+        Ok(Denoised { radiance, times: self.read_times()?, rays, traced })
+    }
+}

@@ -1,0 +1,89 @@
+//! What the commands run a plan on.
+
+mod gpu;
+
+use std::time::Duration;
+
+use anyhow::Result;
+use glam::UVec2;
+use limpid::{Plan, Settings};
+
+use crate::sequence::Frame;
+
+/// A denoised frame and what it took.
+#[derive(Debug, Clone)]
+pub struct Denoised {
+    /// Linear radiance, row by row.
+    pub radiance: Vec<[f32; 3]>,
+    /// Time of each pass, in the order of the plan. Empty where the device cannot measure.
+    pub times: Vec<(String, Duration)>,
+    /// Rays that were traced for it.
+    pub rays: u64,
+    /// The noisy radiance that the listed rays stand for, when a tracer was given.
+    pub traced: Option<Vec<[f32; 4]>>,
+}
+
+/// Traces the reflection rays of some pixels: `rgb` radiance and `a` hit distance for each.
+pub type Tracer<'a> = &'a dyn Fn(&[UVec2]) -> Vec<[f32; 4]>;
+
+/// Something that denoises frames of a sequence one after another.
+pub trait Backend {
+    /// The device, in a few words.
+    fn device(&self) -> &str;
+
+    /// What it runs.
+    fn plan(&self) -> &Plan;
+
+    /// Denoises the frame that follows the last one. With a tracer, `frame.radiance` is not looked at: the rays
+    /// that the classify pass lists are traced instead.
+    ///
+    /// # Errors
+    ///
+    /// For frames that the library refuses and for a device that fails.
+    fn denoise(&mut self, frame: &Frame, exposure: f32, tracer: Option<Tracer<'_>>) -> Result<Denoised>;
+}
+
+/// Opens the best device there is.
+///
+/// # Errors
+///
+/// When there is none, or settings or size are refused.
+pub fn open(settings: &Settings, size: UVec2) -> Result<Box<dyn Backend>> {
+    Ok(Box::new(gpu::Gpu::open(settings, size)?))
+}
+
+/// An entry of the ray list: where to trace, and which neighbours in the 2x2 quad get a copy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ListedRay {
+    /// Pixel to trace.
+    pub pixel: UVec2,
+    /// Copy to the other pixel of its row, of its column, and on the diagonal.
+    pub copies: [bool; 3],
+}
+
+impl ListedRay {
+    /// Decodes what `kernels/classify.wgsl` writes.
+    pub fn unpack(word: u32) -> Self {
+        let bit = |index: u32| word >> index & 1 == 1;
+        Self { pixel: UVec2::new(word & 0x3fff, word >> 14 & 0x3fff), copies: [bit(28), bit(29), bit(30)] }
+    }
+
+    /// The pixels that its radiance goes to, its own first.
+    pub fn targets(self) -> impl Iterator<Item = UVec2> {
+        let others = [UVec2::new(1, 0), UVec2::new(0, 1), UVec2::ONE];
+        let copied = others.into_iter().zip(self.copies).filter(|(_, wanted)| *wanted);
+        std::iter::once(self.pixel).chain(copied.map(move |(other, _)| self.pixel ^ other))
+    }
+}
+
+/// The radiance image that a ray list stands for; pixels without a ray stay 0.
+pub fn trace_listed(rays: &[ListedRay], size: UVec2, tracer: Tracer<'_>) -> Vec<[f32; 4]> {
+    let mut radiance = vec![[0.0; 4]; (size.x * size.y) as usize];
+    let pixels: Vec<UVec2> = rays.iter().map(|ray| ray.pixel).collect();
+    for (ray, value) in rays.iter().zip(tracer(&pixels)) {
+        for target in ray.targets() {
+            radiance[(target.y * size.x + target.x) as usize] = value;
+        }
+    }
+    radiance
+}

@@ -1,0 +1,54 @@
+//! The subcommands.
+
+mod demo;
+mod denoise;
+mod plan;
+mod report;
+mod settings;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+use glam::UVec2;
+
+/// Turns noisy ray-traced reflections into clean, stable images.
+#[derive(Debug, Parser)]
+#[command(name = "limpid", version, about, arg_required_else_help = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Renders a built-in scene with one noisy ray a pixel, denoises it, and measures the result.
+    Demo(demo::Demo),
+    /// Denoises a sequence of EXR frames.
+    Denoise(denoise::Denoise),
+    /// Prints what is allocated and dispatched for some settings and size.
+    Plan(plan::PlanCommand),
+}
+
+impl Cli {
+    /// Runs the command that was asked for.
+    ///
+    /// # Errors
+    ///
+    /// With a message for the user, who can then fix what it names.
+    pub fn run(self) -> Result<()> {
+        match self.command {
+            Command::Demo(demo) => demo.run(),
+            Command::Denoise(denoise) => denoise.run(),
+            Command::Plan(plan) => plan.run(),
+        }
+    }
+}
+
+/// Parses `WIDTHxHEIGHT`.
+fn parse_size(text: &str) -> Result<UVec2, String> {
+    let parsed = text.split_once('x').and_then(|(x, y)| Some(UVec2::new(x.parse().ok()?, y.parse().ok()?)));
+    let size = parsed.ok_or_else(|| format!("expected WIDTHxHEIGHT such as 320x180, found `{text}`"))?;
+    if size.min_element() == 0 || size.max_element() > limpid::MAX_SIZE {
+        return Err(format!("expected 1 to {} pixels in each direction, found {text}", limpid::MAX_SIZE));
+    }
+    Ok(size)
+}

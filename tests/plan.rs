@@ -1,0 +1,222 @@
+//! The plan and the kernels say the same, whatever the settings.
+
+use std::collections::{HashMap, HashSet};
+
+use glam::{Mat3, Mat4, UVec2, Vec2, Vec3, camera::rh};
+use limpid::kernel::{BindingKind, Kernel, Overrides, names};
+use limpid::plan::{Grid, Stage, Usage};
+use limpid::resource::{Access, Kind};
+use limpid::settings::{Channel, Fallback, NormalEncoding, RayList, RaysPerQuad, RoughnessEncoding};
+use limpid::{Camera, Denoiser, Error, FrameInputs, Plan, Preset, Settings};
+use proptest::prelude::*;
+
+const SIZE: UVec2 = UVec2::new(1920, 1080);
+
+fn any_settings() -> impl Strategy<Value = Settings> {
+    use NormalEncoding::{Octahedral, OctahedralUnsigned, Signed, Unsigned};
+    let rays = prop::sample::select(vec![RaysPerQuad::One, RaysPerQuad::Two, RaysPerQuad::Four]);
+    let ray_list = prop::option::of((rays, prop::option::of(0.0f32..=1.0)));
+    (
+        prop::sample::select(vec![Signed, Unsigned, Octahedral, OctahedralUnsigned]),
+        prop::sample::select(vec![Channel::Red, Channel::Green, Channel::Blue, Channel::Alpha]),
+        prop::sample::select(vec![RoughnessEncoding::Perceptual, RoughnessEncoding::Alpha]),
+        prop::sample::select(vec![Fallback::Black, Fallback::Input, Fallback::Environment]),
+        ray_list,
+    )
+        .prop_map(|(normal, channel, roughness, fallback, ray_list)| {
+            let mut settings = Settings::default();
+            settings.conventions.normal = normal;
+            settings.conventions.roughness_channel = channel;
+            settings.conventions.roughness = roughness;
+            settings.coverage.fallback = fallback;
+            settings.coverage.ray_list = ray_list.map(|(rays_per_quad, variance_threshold)| {
+                let mut list = RayList::default();
+                list.rays_per_quad = rays_per_quad;
+                list.variance_threshold = variance_threshold;
+                list
+            });
+            settings
+        })
+}
+
+/// Reflection written again from naga's module, not through limpid's own.
+fn reflected(kernel: &Kernel) -> HashMap<String, (u32, u32, bool)> {
+    let variables = kernel.module.global_variables.iter();
+    variables
+        .filter_map(|(_, variable)| {
+            let at = variable.binding?;
+            let writes = match (variable.space, &kernel.module.types[variable.ty].inner) {
+                (naga::AddressSpace::Storage { access }, _) => access.contains(naga::StorageAccess::STORE),
+                (_, naga::TypeInner::Image { class: naga::ImageClass::Storage { .. }, .. }) => true,
+                _ => false,
+            };
+            Some((variable.name.clone()?, (at.group, at.binding, writes)))
+        })
+        .collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn bindings_are_those_of_the_kernels(settings in any_settings()) {
+        let (plan, kernels) = Plan::new(&settings, SIZE).unwrap();
+        let mut used = HashSet::new();
+        for (pass, kernel) in plan.passes.iter().zip(&kernels) {
+            let bound: HashMap<_, _> = pass
+                .bindings
+                .iter()
+                .map(|b| (b.variable.clone(), (b.group, b.binding, b.access.writes())))
+                .collect();
+            prop_assert_eq!(&bound, &reflected(kernel), "{}", pass.kernel);
+            for b in &pass.bindings {
+                let resource = plan.resource(&b.resource).expect("every bound resource is in the plan");
+                let binding = kernel.bindings.iter().find(|k| k.name == b.variable).unwrap();
+                // The kind of variable fits the kind of resource.
+                match (binding.kind, resource.kind) {
+                    (BindingKind::Uniform, Kind::Constants)
+                    | (BindingKind::TextureFloat, Kind::Input)
+                    | (BindingKind::StorageBuffer(_), Kind::Buffer { .. }) => {}
+                    (BindingKind::TextureFloat | BindingKind::TextureUint, Kind::Texture { .. }) => {}
+                    (BindingKind::StorageTexture(stored), Kind::Texture { format, .. }) => prop_assert_eq!(stored, format),
+                    (variable, resource) => prop_assert!(false, "{}: {variable:?} is bound to {resource:?}", b.variable),
+                }
+                used.insert(b.resource.clone());
+            }
+            if let Grid::Indirect { resource, .. } = &pass.grid {
+                used.insert(resource.clone());
+            }
+        }
+        let listed: HashSet<_> = plan.resources.iter().map(|r| r.name.clone()).collect();
+        prop_assert_eq!(listed, used);
+        prop_assert_eq!(plan.resource("rays").is_some(), settings.coverage.ray_list.is_some());
+        prop_assert_eq!(plan.inputs().any(|i| i == "environment"), settings.coverage.fallback == Fallback::Environment);
+    }
+
+    #[test]
+    fn settings_and_plans_survive_serialisation(settings in any_settings()) {
+        let text = serde_json::to_string(&settings).unwrap();
+        prop_assert_eq!(&serde_json::from_str::<Settings>(&text).unwrap(), &settings);
+        let (plan, _) = Plan::new(&settings, SIZE).unwrap();
+        let text = serde_json::to_string(&plan).unwrap();
+        prop_assert_eq!(serde_json::from_str::<Plan>(&text).unwrap(), plan);
+    }
+}
+
+#[test]
+fn the_plan_as_text() {
+    let (plan, _) = Plan::new(&Settings::default(), SIZE).unwrap();
+    insta::assert_snapshot!(plan);
+}
+
+#[test]
+fn memory_stays_within_the_published_figure() {
+    let (plan, _) = Plan::new(&Preset::Reference.settings(), SIZE).unwrap();
+    // As published: 32.25 bytes a pixel, without the copies of last frame's G-buffer.
+    let prev_guide = 8.0;
+    assert!(plan.bytes_per_pixel() - prev_guide <= 32.25, "{}", plan.bytes_per_pixel());
+    let memory = plan.memory();
+    assert_eq!(memory.total(), plan.resources.iter().map(|r| r.bytes(SIZE)).sum::<u64>());
+}
+
+#[test]
+fn every_hazard_has_a_barrier() {
+    let mut settings = Settings::default();
+    settings.coverage.ray_list = Some(RayList::default());
+    let (plan, _) = Plan::new(&settings, SIZE).unwrap();
+    let barriers = plan.barriers();
+    let has = |kernel: &str, resource: &str| {
+        let index = plan.passes.iter().position(|pass| pass.kernel == kernel).unwrap();
+        barriers[index].iter().any(|barrier| barrier.resource == resource)
+    };
+    // Written, then read.
+    assert!(has("indirect_args", "counters"));
+    assert!(has("reproject", "guide") && has("reproject", "args") && has("reproject", "tiles"));
+    assert!(has("prefilter", "signal") && has("prefilter", "average"));
+    assert!(has("resolve_temporal", "signal"));
+    // Read, then written: last frame's passes still read the lists when the next frame begins.
+    assert!(has("classify", "tiles") && has("classify", "guide"));
+    // Read by both: no barrier.
+    assert!(!has("prefilter", "guide") && !has("resolve_temporal", "average") && !has("resolve_temporal", "tiles"));
+    for barrier in barriers.iter().flatten() {
+        let writes = |usage| matches!(usage, Usage::Kernel(Access::Write | Access::ReadWrite));
+        assert!(writes(barrier.before) || writes(barrier.after), "{barrier:?}");
+    }
+}
+
+#[test]
+fn the_tracer_runs_between_the_stages() {
+    let (plan, _) = Plan::new(&Settings::default(), SIZE).unwrap();
+    let first_denoise = plan.passes.iter().position(|pass| pass.stage == Stage::Denoise).unwrap();
+    for (index, pass) in plan.passes.iter().enumerate() {
+        assert_eq!(pass.stage == Stage::Denoise, index >= first_denoise);
+        let needs_rays = pass.bindings.iter().any(|b| b.resource == "radiance");
+        assert!(!(needs_rays && pass.stage == Stage::Classify), "{}", pass.kernel);
+    }
+}
+
+#[test]
+fn kernels_are_all_used() {
+    let (plan, _) = Plan::new(&Settings::default(), SIZE).unwrap();
+    let planned: HashSet<_> = plan.passes.iter().map(|pass| pass.kernel.as_str()).collect();
+    assert_eq!(planned, names().collect());
+    assert!(Kernel::new("no_such_kernel", &Overrides::new()).is_err());
+}
+
+fn camera() -> Camera {
+    Camera {
+        world_to_view: rh::view::look_at_mat4(Vec3::new(1.0, 2.0, 5.0), Vec3::ZERO, Vec3::Y),
+        view_to_clip: rh::proj::directx::perspective(1.0, 16.0 / 9.0, 0.1, 100.0),
+        jitter: Vec2::ZERO,
+    }
+}
+
+#[test]
+fn bad_input_is_refused_by_name_and_changes_nothing() {
+    let mut denoiser = Denoiser::new(&Settings::default(), UVec2::new(64, 64)).unwrap();
+    let good = FrameInputs::new(camera(), UVec2::new(64, 64));
+    let mut refuse = |change: &dyn Fn(&mut FrameInputs), expected: &str| {
+        let mut inputs = good.clone();
+        change(&mut inputs);
+        let message = denoiser.next_frame(&inputs).unwrap_err().to_string();
+        assert!(message.contains(expected), "{message}");
+    };
+    refuse(&|i| i.size = UVec2::new(65, 64), "`size` is [65, 64]");
+    refuse(&|i| i.size = UVec2::ZERO, "expected 1 to [64, 64]");
+    refuse(&|i| i.exposure = 0.0, "`exposure` is 0");
+    refuse(&|i| i.exposure = f32::NAN, "`exposure` is NaN");
+    refuse(&|i| i.camera.jitter.x = f32::INFINITY, "jitter.x");
+    refuse(&|i| i.camera.world_to_view = Mat4::ZERO, "world_to_view` is singular");
+    refuse(&|i| i.camera.world_to_view.x_axis.x = f32::NAN, "world_to_view` has entries");
+    refuse(&|i| i.camera.view_to_clip.x_axis.x = 0.0, "view_to_clip` is singular");
+    refuse(&|i| i.camera.view_to_clip.x_axis.z = 0.1, "oblique");
+    // Still at the first frame.
+    let schedule = denoiser.next_frame(&good).unwrap();
+    assert_eq!((schedule.phase, schedule.constants.history_valid), (0, 0));
+    assert_eq!(denoiser.next_frame(&good).unwrap().constants.history_valid, 1);
+
+    let mut settings = Settings::default();
+    settings.reproject.max_history = 0.5;
+    let message = denoiser.set_settings(&settings).unwrap_err().to_string();
+    assert_eq!(message, "setting `reproject.max_history` is 0.5, expected 1.0 to 255.0");
+    settings = Settings::default();
+    settings.coverage.environment_from_world = Mat3::NAN;
+    assert!(matches!(denoiser.set_settings(&settings), Err(Error::Setting { .. })));
+    assert!(Denoiser::new(&Settings::default(), UVec2::new(0, 5)).is_err());
+    assert!(Denoiser::new(&Settings::default(), UVec2::new(16385, 5)).is_err());
+}
+
+#[test]
+fn constants_change_without_a_new_plan() {
+    let size = UVec2::new(64, 64);
+    let mut denoiser = Denoiser::new(&Settings::default(), size).unwrap();
+    denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap();
+    let mut settings = Settings::default();
+    settings.resolve.stability = 0.25;
+    assert!(!denoiser.set_settings(&settings).unwrap());
+    let constants = denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap().constants;
+    assert_eq!((constants.stability, constants.history_valid), (0.25, 1));
+    settings.coverage.fallback = Fallback::Black;
+    assert!(denoiser.set_settings(&settings).unwrap());
+    assert_eq!(denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap().constants.history_valid, 0);
+}
