@@ -13,9 +13,8 @@ use limpid_cli::sequence::{ChannelNames, Frame, Sequence, read_rgb};
 fn tone_mapped_psnr(a: &[[f32; 3]], b: &[[f32; 3]], depth: &[f32]) -> f64 {
     let tone_map = |x: f32| f64::from(x.max(0.0)) / (1.0 + f64::from(x.max(0.0)));
     let surfaces = a.iter().zip(b).zip(depth).filter(|(_, depth)| **depth > 0.0);
-    let errors: Vec<f64> = surfaces
-        .flat_map(|((a, b), _)| (0..3).map(move |i| (tone_map(a[i]) - tone_map(b[i])).powi(2)))
-        .collect();
+    let errors: Vec<f64> =
+        surfaces.flat_map(|((a, b), _)| (0..3).map(move |i| (tone_map(a[i]) - tone_map(b[i])).powi(2))).collect();
     -10.0 * (errors.iter().sum::<f64>() / errors.len() as f64).max(1e-12).log10()
 }
 

@@ -1,7 +1,7 @@
 //! The wgpu backend: uploads a frame, records, submits, reads back.
 
 use std::sync::mpsc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow};
 use glam::UVec2;
@@ -184,9 +184,24 @@ impl Gpu {
         Ok(bytes)
     }
 
-    fn classified_rays(&self, encoder: wgpu::CommandEncoder) -> Result<Vec<ListedRay>> {
+    fn encoder(&self) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
+    }
+
+    /// Runs what was recorded and returns how long that took, waiting included.
+    fn run(&self, encoder: wgpu::CommandEncoder) -> Result<Duration> {
+        // Uploads are not part of it.
+        self.queue.submit([]);
+        self.wait()?;
+        let start = Instant::now();
+        self.queue.submit([encoder.finish()]);
+        self.wait()?;
+        Ok(start.elapsed())
+    }
+
+    fn classified_rays(&self) -> Result<Vec<ListedRay>> {
         let list = self.denoiser.ray_list().context("the settings ask for no ray list")?;
-        let mut encoder = encoder;
+        let mut encoder = self.encoder();
         let rays = self.readback_buffer(list.rays.size());
         let count = self.readback_buffer(4);
         encoder.copy_buffer_to_buffer(list.rays, 0, &rays, 0, rays.size());
@@ -197,7 +212,8 @@ impl Gpu {
         Ok(words.into_iter().take(count[0] as usize).map(ListedRay::unpack).collect())
     }
 
-    fn read_output(&self, mut encoder: wgpu::CommandEncoder, size: UVec2) -> Result<Vec<[f32; 3]>> {
+    fn read_output(&self, size: UVec2) -> Result<Vec<[f32; 3]>> {
+        let mut encoder = self.encoder();
         let row = (size.x * 8).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = self.readback_buffer(u64::from(row) * u64::from(size.y));
         let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None };
@@ -245,20 +261,23 @@ impl Backend for Gpu {
         if tracer.is_none() {
             self.upload_radiance(frame.size, &frame.radiance);
         }
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = self.encoder();
         self.denoiser.encode_classify(&self.queue, &mut encoder, &self.images.inputs(), &inputs)?;
         let mut rays = frame.depth.iter().filter(|depth| **depth > 0.0).count() as u64;
+        let mut time = Duration::ZERO;
         let mut traced = None;
         if let Some(tracer) = tracer {
-            let listed = self.classified_rays(encoder)?;
+            time += self.run(encoder)?;
+            let listed = self.classified_rays()?;
             rays = listed.len() as u64;
             let radiance = trace_listed(&listed, frame.size, tracer);
             self.upload_radiance(frame.size, &radiance);
             traced = Some(radiance);
-            encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            encoder = self.encoder();
         }
         self.denoiser.encode_denoise(&mut encoder, &self.images.inputs())?;
-        let radiance = self.read_output(encoder, frame.size)?;
-        Ok(Denoised { radiance, times: self.read_times()?, rays, traced })
+        time += self.run(encoder)?;
+        let radiance = self.read_output(frame.size)?;
+        Ok(Denoised { radiance, time, pass_times: self.read_times()?, rays, traced })
     }
 }

@@ -15,8 +15,10 @@ use crate::sequence::Frame;
 pub struct Denoised {
     /// Linear radiance, row by row.
     pub radiance: Vec<[f32; 3]>,
-    /// Time of each pass, in the order of the plan. Empty where the device cannot measure.
-    pub times: Vec<(String, Duration)>,
+    /// From submission until the device was done, uploads and read-back excluded.
+    pub time: Duration,
+    /// Time of each pass by the device's own clock, in the order of the plan. Empty where it has none.
+    pub pass_times: Vec<(String, Duration)>,
     /// Rays that were traced for it.
     pub rays: u64,
     /// The noisy radiance that the listed rays stand for, when a tracer was given.

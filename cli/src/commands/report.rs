@@ -43,6 +43,8 @@ pub(super) struct Report {
     rays_per_pixel: f64,
     bytes_per_pixel: f64,
     dispatches_per_frame: usize,
+    /// From submission to completion, mean over the frames after the first.
+    milliseconds_per_frame: Option<f64>,
     passes: Vec<PassReport>,
     noisy: Option<Scores>,
     denoised: Option<Scores>,
@@ -55,7 +57,8 @@ pub(super) struct Recorder {
     denoised_scorer: Scorer,
     noisy: Vec<FrameScore>,
     denoised: Vec<FrameScore>,
-    times: BTreeMap<String, Duration>,
+    total_time: Duration,
+    pass_times: BTreeMap<String, Duration>,
     timed_frames: u32,
     frames: usize,
     rays: u64,
@@ -74,7 +77,8 @@ impl Recorder {
             denoised_scorer: Scorer::new(exposure),
             noisy: Vec::new(),
             denoised: Vec::new(),
-            times: BTreeMap::new(),
+            total_time: Duration::ZERO,
+            pass_times: BTreeMap::new(),
             timed_frames: 0,
             frames: 0,
             rays: 0,
@@ -87,10 +91,11 @@ impl Recorder {
             self.denoised.push(self.denoised_scorer.score(&denoised.radiance, frame));
         }
         // The first frame's times contain compilation.
-        if self.frames > 0 && !denoised.times.is_empty() {
+        if self.frames > 0 {
             self.timed_frames += 1;
-            for (kernel, time) in &denoised.times {
-                *self.times.entry(kernel.clone()).or_default() += *time;
+            self.total_time += denoised.time;
+            for (kernel, time) in &denoised.pass_times {
+                *self.pass_times.entry(kernel.clone()).or_default() += *time;
             }
         }
         self.frames += 1;
@@ -100,8 +105,8 @@ impl Recorder {
     pub(super) fn finish(self, name: String, backend: &dyn Backend) -> Report {
         let plan = backend.plan();
         let pixels = u64::from(plan.size.x) * u64::from(plan.size.y) * self.frames as u64;
-        let milliseconds =
-            |kernel: &str| self.times.get(kernel).map(|total| total.as_secs_f64() * 1e3 / f64::from(self.timed_frames));
+        let timed_frames = f64::from(self.timed_frames);
+        let milliseconds = |total: &Duration| total.as_secs_f64() * 1e3 / timed_frames;
         let passes = plan.passes.iter();
         Report {
             name,
@@ -113,8 +118,12 @@ impl Recorder {
             rays_per_pixel: self.rays as f64 / pixels.max(1) as f64,
             bytes_per_pixel: plan.bytes_per_pixel(),
             dispatches_per_frame: plan.passes.len(),
+            milliseconds_per_frame: (self.timed_frames > 0).then(|| milliseconds(&self.total_time)),
             passes: passes
-                .map(|pass| PassReport { kernel: pass.kernel.clone(), milliseconds: milliseconds(&pass.kernel) })
+                .map(|pass| PassReport {
+                    kernel: pass.kernel.clone(),
+                    milliseconds: self.pass_times.get(&pass.kernel).map(milliseconds),
+                })
                 .collect(),
             noisy: (!self.noisy.is_empty()).then(|| Scores::new(self.noisy)),
             denoised: (!self.denoised.is_empty()).then(|| Scores::new(self.denoised)),
@@ -140,13 +149,11 @@ impl Report {
         );
         println!("{:.2} bytes per pixel, {} dispatches per frame", self.bytes_per_pixel, self.dispatches_per_frame);
         let timed = self.passes.iter().filter_map(|pass| Some((&pass.kernel, pass.milliseconds?)));
-        let mut total = 0.0;
         for (kernel, milliseconds) in timed {
             println!("  {kernel:<18}{milliseconds:9.3} ms");
-            total += milliseconds;
         }
-        if total > 0.0 {
-            println!("  {:<18}{total:9.3} ms", "all passes");
+        if let Some(milliseconds) = self.milliseconds_per_frame {
+            println!("  {:<18}{milliseconds:9.3} ms", "whole frame");
         }
         println!("on {}", self.device);
         Ok(())

@@ -184,19 +184,19 @@ fn frames_are_well_formed() {
             let cut = number == 0 || (scene.name == "dolly" && number == 12);
             assert_eq!(frame.reset, cut, "{} {number}", scene.name);
             let reference = frame.reference.as_ref().expect("asked for");
-            for index in 0..frame.depth.len() {
+            for (index, mean) in reference.iter().enumerate() {
                 let sky = frame.depth[index] == 0.0;
                 let normal = Vec3::from(frame.normal[index]);
                 let radiance = frame.radiance[index];
                 assert!(normal.is_normalized() != sky && (normal == Vec3::ZERO) == sky);
                 assert!(radiance.iter().all(|x| x.is_finite() && *x >= 0.0));
-                assert!(reference[index].iter().all(|x| x.is_finite() && *x >= 0.0));
+                assert!(mean.iter().all(|x| x.is_finite() && *x >= 0.0));
                 assert!(Vec2::from(frame.motion[index]).is_finite());
                 assert!(!frame.reset || frame.motion[index] == [0.0; 2]);
                 assert!((0.0..=1.0).contains(&frame.roughness[index]));
                 assert!((0.1..1000.0).contains(&frame.depth[index]) || sky);
                 assert!((0.0..=10_000.0).contains(&radiance[3]));
-                let dark = radiance == [0.0; 4] && reference[index] == [0.0; 3];
+                let dark = radiance == [0.0; 4] && *mean == [0.0; 3];
                 assert!(!sky || (dark && frame.roughness[index] == 1.0));
             }
         }

@@ -24,7 +24,7 @@ const MIRRORS: u32 = 4;
 const MIRRORED_LAMP: f32 = 4.0;
 
 /// Fainter contributions to the reference are left to chance.
-const FAINT: f32 = 0.02;
+const FAINT: f32 = 0.05;
 
 /// Ambient light fades in crevices; at this distance, world units, to one half.
 const AMBIENT_REACH: f32 = 0.5;
@@ -98,7 +98,8 @@ fn lamp_in_lobe(world: &World, surface: &Surface, lobe: &Lobe, sampler: &mut Sam
 /// a mirror.
 fn reflected(world: &World, first: Option<Hit>, direction: Vec3, sampler: &mut Sampler) -> Vec3 {
     let (mut hit, mut direction, mut tint) = (first, direction, Vec3::ONE);
-    for mirrors in 0.. {
+    let mut mirrors = 0;
+    loop {
         let lamp = world.lamp_along(direction, hit.as_ref());
         let glow = match lamp {
             Some(lamp) if mirrors > 0 => dimmed(world.lights[lamp].radiance),
@@ -116,8 +117,8 @@ fn reflected(world: &World, first: Option<Hit>, direction: Vec3, sampler: &mut S
         tint *= world.albedo(&surface);
         direction = direction.reflect(surface.normal);
         hit = world.hit(lift(surface.point, surface.normal), direction);
+        mirrors += 1;
     }
-    unreachable!("the last mirror counts as diffuse")
 }
 
 /// Light scattered by a diffuse surface: one sampled light and one ambient ray.

@@ -32,7 +32,7 @@ pub(super) fn scene() -> Scene {
 fn road() -> Object {
     let asphalt = Pattern::Clouds { colors: [vec3(0.16, 0.16, 0.17), vec3(0.34, 0.33, 0.32)], size: 1.0 };
     let wet = Finish::Patches { range: [0.05, 0.38], size: 1.6 };
-    Object::floor(Vec3::ZERO, vec2(200.0, 200.0), asphalt, wet)
+    Object::floor(Vec3::ZERO, vec2(24.0, 24.0), asphalt, wet)
 }
 
 /// Two loose rows of thin poles in changing colours.
