@@ -92,8 +92,9 @@ fn prefers_ray(pixel: vec2<u32>, guide: Guide) -> bool {
         return true;
     }
     if RAYS_FOLLOW_VARIANCE {
-        if frame.history_valid != 0u && all(pixel < frame.prev_size)
-            && textureLoad(in_history, pixel, 0).a > frame.ray_variance_threshold {
+        // One condition, not two branches: see `reproject`.
+        let has_history = all(pixel < frame.prev_size) & (frame.history_valid != 0u);
+        if has_history && textureLoad(in_history, pixel, 0).a > frame.ray_variance_threshold {
             return true;
         }
     }

@@ -212,9 +212,6 @@ fn repair_edge(guide: Guide, found: Match) -> Match {
 }
 
 fn find_history(pixel: vec2<u32>, guide: Guide, statistics: Statistics) -> Match {
-    if frame.history_valid == 0u {
-        return no_match();
-    }
     var found = choose_candidate(pixel, guide, statistics);
     if found.factor > 0.0 && found.factor < frame.disocclusion_threshold {
         found = search_around(guide, found);
@@ -267,7 +264,12 @@ fn reproject(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
             var radiance = load_radiance(pixel);
             reprojected.length = 1.0;
             reprojected.variance = 1.0;
-            let found = find_history(pixel, guide, statistics);
+            var found = no_match();
+            // Mesa's lavapipe compiles a kernel anew in every frame in which a branch depends on constants
+            // alone, so this one depends on the pixel too.
+            if guide.denoised & (frame.history_valid != 0u) {
+                found = find_history(pixel, guide, statistics);
+            }
             if found.factor > 0.0 {
                 let length = history_length_at(found.prev_uv) * found.factor;
                 reprojected.length = min(history_cap(alpha_of(guide.roughness)), length + 1.0);

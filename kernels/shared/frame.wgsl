@@ -82,8 +82,5 @@ fn world_position(pixel: vec2<u32>, depth: f32) -> vec3<f32> {
 
 // Unit direction from the camera to a camera-relative position; all parallel for an orthographic camera.
 fn view_direction(position: vec3<f32>) -> vec3<f32> {
-    if frame.clip_w.y == 0.0 {
-        return frame.forward.xyz;
-    }
-    return normalize(position);
+    return select(normalize(position), frame.forward.xyz, frame.clip_w.y == 0.0);
 }
