@@ -81,6 +81,7 @@ fn decode_guide(pixel: vec2<u32>) -> Guide {
     if ROUGHNESS_IS_ALPHA {
         guide.roughness = sqrt(guide.roughness);
     }
+    guide.roughness = quantized_roughness(guide.roughness);
     guide.depth = select(SKY_DEPTH, decode_depth(pixel), usable);
     guide.denoised = guide.depth < SKY_DEPTH && guide.roughness <= frame.roughness_threshold;
     return guide;
@@ -92,9 +93,9 @@ fn prefers_ray(pixel: vec2<u32>, guide: Guide) -> bool {
         return true;
     }
     if RAYS_FOLLOW_VARIANCE {
-        // One condition, not two branches: see `reproject`.
-        let has_history = all(pixel < frame.prev_size) & (frame.history_valid != 0u);
-        if has_history && textureLoad(in_history, pixel, 0).a > frame.ray_variance_threshold {
+        // The last output may have had another size; 0 when there is none.
+        let prev_pixel = vec2<u32>(pixel_uv(pixel) * vec2<f32>(frame.prev_size));
+        if all(prev_pixel < frame.prev_size) && textureLoad(in_history, prev_pixel, 0).a > frame.ray_variance_threshold {
             return true;
         }
     }

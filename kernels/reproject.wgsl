@@ -12,7 +12,8 @@
 //! out  average        rgba16float   tile   rgb: average radiance; a: 1
 //!
 //! Grid: one 8x8 workgroup per listed tile (indirect). 18 taps of workgroup memory for the 9x9 statistics;
-//! 8 guide loads, 4 to 8 history loads, 36 more guide loads where the first guess fails.
+//! 8 guide, 4 history and 4 length loads; where the first guess fails 36 to 40 more guide and 4 to 8 more
+//! history loads.
 //! After: reprojection of the AMD FidelityFX denoiser 1.2 (2021). Differs: see "Deviations" in docs/reference.md.
 
 import package::shared::frame;
@@ -52,15 +53,26 @@ fn footprint_texel(footprint: Footprint, corner: u32) -> vec2<i32> {
     return clamp(texel, vec2<i32>(0), vec2<i32>(frame.prev_size) - 1);
 }
 
+// Whether last frame shows a place. Never when there is no usable history: its size is 0 then. (A branch on
+// constants alone would make Mesa's lavapipe compile the kernel anew in every frame.)
+fn is_on_prev_screen(prev_uv: vec2<f32>) -> bool {
+    let size = vec2<f32>(frame.prev_size);
+    let position = prev_uv * size;
+    return all(position > vec2<f32>(0.0)) && all(position < size);
+}
+
 // Surface of last frame around a place. Inverse depth is blended, being linear on screen.
 struct PrevSurface {
     normal: vec3<f32>,
     depth: f32,
     alpha: f32,
+    // The texels around the place; those without a reflection have no weight.
+    reflections: Footprint,
 }
 
 fn prev_surface_at(prev_uv: vec2<f32>) -> PrevSurface {
     let footprint = footprint_at(prev_uv);
+    var reflections = footprint;
     var normal = vec3<f32>(0.0);
     var inverse_depth = 0.0;
     var alpha = 0.0;
@@ -71,33 +83,29 @@ fn prev_surface_at(prev_uv: vec2<f32>) -> PrevSurface {
         normal += select(w, 0.0, tap.depth >= SKY_DEPTH) * tap.normal;
         inverse_depth += w / tap.depth;
         alpha += w * alpha_of(tap.roughness);
+        reflections.weights[i] = select(0.0, w, tap.denoised);
     }
-    var surface: PrevSurface;
-    surface.normal = normal * inverseSqrt(max(dot(normal, normal), 1e-12));
-    surface.depth = 1.0 / inverse_depth;
-    surface.alpha = alpha;
-    return surface;
+    return PrevSurface(normal * inverseSqrt(max(dot(normal, normal), 1e-12)), 1.0 / inverse_depth, alpha, reflections);
 }
 
 // rgb: history radiance, exposed; a: its variance.
-fn history_at(prev_uv: vec2<f32>) -> vec4<f32> {
-    let footprint = footprint_at(prev_uv);
+fn history_at(reflections: Footprint) -> vec4<f32> {
     var sum = vec4<f32>(0.0);
     for (var i = 0u; i < 4u; i++) {
-        sum += footprint.weights[i] * textureLoad(in_history, footprint_texel(footprint, i), 0);
+        // Multiplying would let whatever a texel without a reflection holds through, if that is not finite.
+        if reflections.weights[i] > 0.0 {
+            sum += reflections.weights[i] * textureLoad(in_history, footprint_texel(reflections, i), 0);
+        }
     }
-    return vec4<f32>(sum.rgb * frame.exposure, sum.a);
+    let history = sum / max(dot(reflections.weights, vec4<f32>(1.0)), 1e-6);
+    return vec4<f32>(history.rgb * frame.exposure, history.a);
 }
 
-fn history_length_at(prev_uv: vec2<f32>) -> f32 {
-    let footprint = footprint_at(prev_uv);
+fn history_length_at(reflections: Footprint) -> f32 {
     var sum = 0.0;
     for (var i = 0u; i < 4u; i++) {
-        let texel = footprint_texel(footprint, i);
-        // Pixels that were left out hold nothing that counts.
-        if packed_guide_is_denoised(textureLoad(in_prev_guide, texel, 0).xy) {
-            sum += footprint.weights[i] * unpack_reprojected(textureLoad(in_prev_signal, texel, 0).xy).length;
-        }
+        let texel = textureLoad(in_prev_signal, footprint_texel(reflections, i), 0).xy;
+        sum += reflections.weights[i] * unpack_reprojected(texel).length;
     }
     return sum;
 }
@@ -114,9 +122,8 @@ fn surface_prev_uv(pixel: vec2<u32>) -> vec2<f32> {
 }
 
 // Where the reflected point was, as if it lay straight behind the surface by the hit distance.
-fn parallax_prev_uv(pixel: vec2<u32>, guide: Guide) -> vec2<f32> {
+fn parallax_prev_uv(pixel: vec2<u32>, guide: Guide, hit_distance: f32) -> vec2<f32> {
     let surface = world_position(pixel, guide.depth);
-    let hit_distance = textureLoad(in_radiance, pixel, 0).a;
     let image = surface + view_direction(surface) * hit_distance;
     let projected = frame.prev_uv_from_world * vec4<f32>(image, 1.0);
     if !(projected.w > 0.0) {
@@ -134,35 +141,53 @@ fn disocclusion_factor(guide: Guide, normal: vec3<f32>, depth: f32) -> f32 {
 
 struct Match {
     prev_uv: vec2<f32>,
+    // Trust, 0 to 1; negative when there is no match.
+    factor: f32,
+    reflections: Footprint,
     // rgb: radiance; a: variance.
     history: vec4<f32>,
-    // 0 when there is no history.
-    factor: f32,
 }
 
 fn no_match() -> Match {
-    return Match(vec2<f32>(-1.0), vec4<f32>(0.0), 0.0);
+    return Match(vec2<f32>(-1.0), -1.0, Footprint(vec2<i32>(0), vec4<f32>(0.0)), vec4<f32>(0.0));
+}
+
+fn match_at(prev_uv: vec2<f32>, guide: Guide, surface: PrevSurface) -> Match {
+    let factor = disocclusion_factor(guide, surface.normal, surface.depth);
+    return Match(prev_uv, factor, surface.reflections, history_at(surface.reflections));
 }
 
 // One of the two candidates, or none, by last frame's normal, roughness and colour.
-fn choose_candidate(pixel: vec2<u32>, guide: Guide, statistics: Statistics) -> Match {
-    let parallax_uv = parallax_prev_uv(pixel, guide);
-    let surface_uv = surface_prev_uv(pixel);
-    let parallax = prev_surface_at(parallax_uv);
-    let surface = prev_surface_at(surface_uv);
-    let parallax_cosine = dot(guide.normal, parallax.normal);
-    let surface_cosine = dot(guide.normal, surface.normal);
+fn choose_candidate(pixel: vec2<u32>, lane: u32, guide: Guide, hit_distance: f32) -> Match {
     let alpha = alpha_of(guide.roughness);
-    if parallax_cosine > frame.parallax_normal_cosine
-        && parallax_cosine + frame.parallax_normal_margin > surface_cosine
-        && abs(parallax.alpha - alpha) < abs(surface.alpha - alpha) + frame.parallax_roughness_margin {
-        let factor = disocclusion_factor(guide, parallax.normal, parallax.depth);
-        return Match(parallax_uv, history_at(parallax_uv), factor);
+    let surface_uv = surface_prev_uv(pixel);
+    var surface: PrevSurface;
+    // Off screen it fits as badly as can be.
+    var surface_cosine = -1.0;
+    var surface_alpha_error = 1.0;
+    let has_surface = is_on_prev_screen(surface_uv);
+    if has_surface {
+        surface = prev_surface_at(surface_uv);
+        surface_cosine = dot(guide.normal, surface.normal);
+        surface_alpha_error = abs(surface.alpha - alpha);
     }
-    let history = history_at(surface_uv);
-    let difference = history.rgb - statistics.mean;
-    if dot(difference, difference) < frame.surface_color_gate * length(statistics.variance) {
-        return Match(surface_uv, history, disocclusion_factor(guide, surface.normal, surface.depth));
+    let parallax_uv = parallax_prev_uv(pixel, guide, hit_distance);
+    if is_on_prev_screen(parallax_uv) {
+        let parallax = prev_surface_at(parallax_uv);
+        let parallax_cosine = dot(guide.normal, parallax.normal);
+        if parallax_cosine > frame.parallax_normal_cosine
+            && parallax_cosine + frame.parallax_normal_margin > surface_cosine
+            && abs(parallax.alpha - alpha) < surface_alpha_error + frame.parallax_roughness_margin {
+            return match_at(parallax_uv, guide, parallax);
+        }
+    }
+    if has_surface {
+        let found = match_at(surface_uv, guide, surface);
+        let statistics = neighborhood_statistics(lane);
+        let difference = found.history.rgb - statistics.mean;
+        if dot(difference, difference) < frame.surface_color_gate * length(statistics.variance) {
+            return found;
+        }
     }
     return no_match();
 }
@@ -170,60 +195,60 @@ fn choose_candidate(pixel: vec2<u32>, guide: Guide, statistics: Statistics) -> M
 // The best of the 3x3 places around a match.
 fn search_around(guide: Guide, found: Match) -> Match {
     var best = found;
-    for (var y = -1; y <= 1; y++) {
-        for (var x = -1; x <= 1; x++) {
-            let uv = found.prev_uv + vec2<f32>(vec2<i32>(x, y)) / vec2<f32>(frame.prev_size);
-            let surface = prev_surface_at(uv);
-            let factor = disocclusion_factor(guide, surface.normal, surface.depth);
-            if factor > best.factor {
-                best.factor = factor;
-                best.prev_uv = uv;
-            }
+    for (var i = 0; i < 9; i++) {
+        let offset = vec2<f32>(vec2<i32>(i % 3, i / 3) - 1);
+        let uv = found.prev_uv + offset / vec2<f32>(frame.prev_size);
+        let surface = prev_surface_at(uv);
+        let factor = disocclusion_factor(guide, surface.normal, surface.depth);
+        if factor > best.factor {
+            best.factor = factor;
+            best.prev_uv = uv;
+            best.reflections = surface.reflections;
         }
     }
-    best.history = history_at(best.prev_uv);
+    best.history = history_at(best.reflections);
     return best;
 }
 
 // Only those of the four texels that show the same surface.
 fn repair_edge(guide: Guide, found: Match) -> Match {
     let footprint = footprint_at(found.prev_uv);
+    var fitting = found.reflections;
     var weight_sum = 0.0;
-    var radiance = vec3<f32>(0.0);
     var normal = vec3<f32>(0.0);
     var depth = 0.0;
     for (var i = 0u; i < 4u; i++) {
-        let texel = footprint_texel(footprint, i);
-        let tap = unpack_guide(textureLoad(in_prev_guide, texel, 0).xy);
+        let tap = unpack_guide(textureLoad(in_prev_guide, footprint_texel(footprint, i), 0).xy);
         let factor = disocclusion_factor(guide, tap.normal, tap.depth);
         if factor > frame.disocclusion_threshold * frame.disocclusion_tap_fraction {
             let w = footprint.weights[i];
             weight_sum += w;
-            radiance += w * textureLoad(in_history, texel, 0).rgb;
             normal += w * tap.normal;
             depth += w * tap.depth;
+        } else {
+            fitting.weights[i] = 0.0;
         }
     }
     let normalization = 1.0 / max(weight_sum, 0.001);
     var repaired = found;
-    repaired.history = vec4<f32>(radiance * normalization * frame.exposure, found.history.a);
+    repaired.history = vec4<f32>(history_at(fitting).rgb, found.history.a);
     repaired.factor = disocclusion_factor(guide, normal * normalization, depth * normalization);
     return repaired;
 }
 
-fn find_history(pixel: vec2<u32>, guide: Guide, statistics: Statistics) -> Match {
-    var found = choose_candidate(pixel, guide, statistics);
-    if found.factor > 0.0 && found.factor < frame.disocclusion_threshold {
+fn find_history(pixel: vec2<u32>, lane: u32, guide: Guide, hit_distance: f32) -> Match {
+    var found = choose_candidate(pixel, lane, guide, hit_distance);
+    if found.factor >= 0.0 && found.factor < frame.disocclusion_threshold {
         found = search_around(guide, found);
         if found.factor < frame.disocclusion_threshold {
             found = repair_edge(guide, found);
         }
     }
-    let on_screen = all(found.prev_uv > vec2<f32>(0.0)) && all(found.prev_uv < vec2<f32>(1.0));
-    if !on_screen || found.factor < frame.disocclusion_threshold {
-        return no_match();
+    let has_reflection = dot(found.reflections.weights, vec4<f32>(1.0)) > 0.001;
+    if found.factor >= frame.disocclusion_threshold && has_reflection && is_on_prev_screen(found.prev_uv) {
+        return found;
     }
-    return found;
+    return no_match();
 }
 
 // Frames of history that are worth keeping: fewer on smoother surfaces.
@@ -254,7 +279,6 @@ fn reproject(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     sum_rows(lane);
     workgroupBarrier();
 
-    let statistics = neighborhood_statistics(lane);
     // rgb: weighted radiance, a: weight in the average of the tile.
     var contribution = vec4<f32>(0.0);
     if all(pixel < frame.size) {
@@ -262,16 +286,12 @@ fn reproject(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
         var reprojected = Reprojected(vec3<f32>(0.0), 0.0, 0.0);
         if guide.denoised {
             var radiance = load_radiance(pixel);
+            let hit_distance = textureLoad(in_radiance, pixel, 0).a;
             reprojected.length = 1.0;
             reprojected.variance = 1.0;
-            var found = no_match();
-            // Mesa's lavapipe compiles a kernel anew in every frame in which a branch depends on constants
-            // alone, so this one depends on the pixel too.
-            if guide.denoised & (frame.history_valid != 0u) {
-                found = find_history(pixel, guide, statistics);
-            }
-            if found.factor > 0.0 {
-                let length = history_length_at(found.prev_uv) * found.factor;
+            let found = find_history(pixel, lane, guide, hit_distance);
+            if found.factor >= 0.0 {
+                let length = history_length_at(found.reflections) * found.factor;
                 reprojected.length = min(history_cap(alpha_of(guide.roughness)), length + 1.0);
                 reprojected.radiance = found.history.rgb;
                 let spread = temporal_variance(radiance, found.history.rgb);
@@ -296,7 +316,7 @@ fn reproject(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     }
     if lane == 0u {
         let total = row_sum[0];
-        let average = min(total.rgb / max(total.a, 0.001), vec3<f32>(HALF_MAX));
+        let average = min(total.rgb / max(total.a, 1e-12), vec3<f32>(HALF_MAX));
         textureStore(out_average, tile, vec4<f32>(average, 1.0));
     }
 }

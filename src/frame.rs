@@ -1,6 +1,6 @@
 //! What changes from frame to frame, and the constants that the kernels see of it.
 
-use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, UVec2, Vec2};
+use glam::{DMat4, DVec2, DVec3, DVec4, Mat3, Mat4, UVec2, Vec2};
 use serde::{Deserialize, Serialize};
 
 use crate::settings::{DepthEncoding, NdcY, Settings};
@@ -12,7 +12,8 @@ pub struct Camera {
     /// World to view space: a rigid motion, either handedness.
     pub world_to_view: Mat4,
     /// View to clip space: perspective or orthographic, depth 0 to 1 standard or reversed, the far plane
-    /// finite or infinite, off-centre allowed, no skew.
+    /// finite or infinite, off-centre allowed, no skew. An orthographic one with depth supplied as
+    /// [`DepthEncoding::Linear`] has to be of standard depth, as nothing else tells where it looks.
     pub view_to_clip: Mat4,
     /// Where in its pixel the camera sampled, from the pixel's centre, in pixels, `x` right, `y` down,
     /// usually within -0.5 to 0.5.
@@ -31,7 +32,8 @@ pub struct FrameInputs {
     /// History is of no use: first frame, camera cut, teleport. The first frame of a denoiser always is one.
     pub reset: bool,
     /// Factor that brings radiance near 1, where the published constants were tuned. Above 0. Input and
-    /// output are not exposed; it may change every frame.
+    /// output are not exposed; it may change every frame. Output is half float: where exposed radiance near 1
+    /// stands for more than 65504 or less than 0.0001, scale the input instead.
     pub exposure: f32,
     /// Camera of the preceding frame, where it is not the one that was denoised last (frames were skipped).
     pub previous_camera: Option<Camera>,
@@ -79,8 +81,6 @@ constants! {
         jitter_uv: [f32; 2],
         size: [u32; 2],
         prev_size: [u32; 2],
-        history_valid: u32,
-        frame_index: u32,
         exposure: f32,
         inverse_exposure: f32,
         roughness_threshold: f32,
@@ -115,7 +115,6 @@ constants! {
         clip_extent_floor: f32,
         history_length_steps: f32,
         padding: f32,
-        padding_to_16_bytes: [f32; 2],
     }
 }
 
@@ -132,9 +131,10 @@ fn check_camera(camera: &Camera) -> Result<(), Error> {
     if !view.is_finite() {
         return fail("world_to_view", "has entries that are not finite", view);
     }
-    let determinant = view.as_dmat4().determinant().abs();
-    if determinant < 1e-12 || view.row(3).to_array() != [0.0, 0.0, 0.0, 1.0] {
-        return fail("world_to_view", "is singular or not a rigid motion", view);
+    let axes = Mat3::from_mat4(view);
+    let is_rotation = (axes * axes.transpose()).abs_diff_eq(Mat3::IDENTITY, 1e-3);
+    if !is_rotation || view.row(3).to_array() != [0.0, 0.0, 0.0, 1.0] {
+        return fail("world_to_view", "is not a rigid motion", view);
     }
     let clip = camera.view_to_clip;
     if !clip.is_finite() {
@@ -211,7 +211,6 @@ pub(crate) fn constants(
     inputs: &FrameInputs,
     allocated: UVec2,
     previous: Option<Previous>,
-    frame_index: u32,
 ) -> Result<FrameConstants, Error> {
     check_frame(inputs, allocated)?;
     let camera = &inputs.camera;
@@ -273,9 +272,7 @@ pub(crate) fn constants(
         motion_offset: motion_offset.as_vec2().to_array(),
         jitter_uv: (jitter / size).as_vec2().to_array(),
         size: inputs.size.to_array(),
-        prev_size: prev_size.to_array(),
-        history_valid: u32::from(previous.is_some() && !inputs.reset),
-        frame_index,
+        prev_size: if previous.is_some() && !inputs.reset { prev_size.to_array() } else { [0, 0] },
         exposure: inputs.exposure,
         inverse_exposure: 1.0 / inputs.exposure,
         roughness_threshold: settings.coverage.roughness_threshold,
@@ -310,6 +307,5 @@ pub(crate) fn constants(
         clip_extent_floor: resolve.clip_extent_floor,
         history_length_steps: (255.0 / reproject.max_history).floor(),
         padding: 0.0,
-        padding_to_16_bytes: [0.0; 2],
     })
 }

@@ -36,8 +36,8 @@
 //! | radiance | linear, along the reflected ray, **before** it is multiplied by BRDF, Fresnel or albedo; negative counts as 0, NaN and infinity as no light |
 //! | hit distance | alpha of `radiance`: world-space distance from the surface to what the ray hit; for a miss a large finite number, such as 10000 |
 //! | depth | [`DepthEncoding`](settings::DepthEncoding): device depth, or linear distance along the view axis. Sky is the far plane, or 0 when linear |
-//! | normal | world space, [`NormalEncoding`](settings::NormalEncoding); a pixel with a zero or non-finite normal is treated as sky |
-//! | roughness | perceptual or GGX alpha (perceptual squared) |
+//! | normal | world space, [`NormalEncoding`](settings::NormalEncoding); a pixel with a zero or non-finite normal counts as sky |
+//! | roughness | perceptual or GGX alpha (perceptual squared); a pixel where it is not finite counts as sky |
 //! | motion | `uv_now - uv_before` of the surface after multiplication by `motion_scale`, object motion included: `previous = uv - motion * scale` |
 //! | jitter | where in the pixel the camera sampled, in pixels from the centre; history is kept at pixel centres |
 //! | exposure | [`FrameInputs::exposure`] brings radiance near 1, where the published constants were tuned; images go in and out unexposed |
@@ -48,8 +48,8 @@
 //! Wrong sign or scale is the most common mistake, and it hides: with the camera at rest all is well. Pan the
 //! camera slowly. With right vectors reflections on rough surfaces stay sharp-edged and calm. With the sign
 //! flipped they smear **in the direction of motion, twice as far as the camera moved**, and borders of objects
-//! trail. With `y` flipped only vertical motion smears. With a scale that is too small (ndc taken for uv is
-//! twice too large, pixels are hundreds of times too large) everything turns noisy while the camera moves,
+//! trail. With `y` flipped only vertical motion smears. With a wrong scale (ndc taken for uv is twice too
+//! large, pixels are hundreds of times too large) everything turns noisy while the camera moves,
 //! because history is rejected, and calms down as soon as it stops. Mirror-like flat surfaces hide all this:
 //! they follow the hit distance and the camera matrices instead; look at rough or curved ones.
 

@@ -399,16 +399,16 @@ impl Plan {
     ///
     /// Between uses that only read there is none, whatever the backend has to do about image layouts.
     pub fn barriers(&self) -> Vec<Vec<Barrier>> {
-        let mut last_use: Vec<[Option<Usage>; 2]> = vec![[None; 2]; self.resources.len()];
+        let mut uses = vec![<[Uses; 2]>::default(); self.resources.len()];
         let mut barriers = Vec::new();
         // The first frame only leaves behind what the second one has to wait for.
         for phase in [0, 1] {
-            barriers = self.passes.iter().map(|pass| self.pass_barriers(pass, phase, &mut last_use)).collect();
+            barriers = self.passes.iter().map(|pass| self.pass_barriers(pass, phase, &mut uses)).collect();
         }
         barriers
     }
 
-    fn pass_barriers(&self, pass: &Pass, phase: usize, last_use: &mut [[Option<Usage>; 2]]) -> Vec<Barrier> {
+    fn pass_barriers(&self, pass: &Pass, phase: usize, uses: &mut [[Uses; 2]]) -> Vec<Barrier> {
         let bound = pass.bindings.iter().map(|b| (b.resource.as_str(), b.copy, Usage::Kernel(b.access)));
         let indirect = match &pass.grid {
             Grid::Indirect { resource, .. } => Some((resource.as_str(), Current, Usage::Indirect)),
@@ -417,18 +417,42 @@ impl Plan {
         let mut barriers = Vec::new();
         for (name, copy, after) in bound.chain(indirect) {
             let Some(index) = self.resources.iter().position(|resource| resource.name == name) else { continue };
-            if self.resources[index].lifetime == Lifetime::External {
-                continue;
+            let resource = &self.resources[index];
+            if resource.lifetime != Lifetime::External {
+                let before = uses[index][copy.index(resource.ping_pong, phase)].then(after);
+                barriers.extend(before.into_iter().map(|before| Barrier {
+                    resource: name.to_owned(),
+                    copy,
+                    before,
+                    after,
+                }));
             }
-            let slot = &mut last_use[index][copy.index(self.resources[index].ping_pong, phase)];
-            if let Some(before) = slot.filter(|before| before.writes() || after.writes()) {
-                barriers.push(Barrier { resource: name.to_owned(), copy, before, after });
-            }
-            // A read does not hide an earlier write that other reads have to wait for as well, but their
-            // barrier was this one.
-            *slot = Some(after);
         }
         barriers
+    }
+}
+
+/// How a resource was used since, and including, its last write.
+#[derive(Debug, Clone, Default)]
+struct Uses {
+    write: Option<Usage>,
+    reads: Vec<Usage>,
+}
+
+impl Uses {
+    /// Notes a use and returns the earlier ones that it has to wait for.
+    fn then(&mut self, after: Usage) -> Vec<Usage> {
+        if after.writes() {
+            let reads = std::mem::take(&mut self.reads);
+            let write = self.write.replace(after);
+            // Reads waited for the write before them.
+            return if reads.is_empty() { write.into_iter().collect() } else { reads };
+        }
+        if self.reads.contains(&after) {
+            return Vec::new();
+        }
+        self.reads.push(after);
+        self.write.into_iter().collect()
     }
 }
 

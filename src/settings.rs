@@ -12,7 +12,7 @@ use crate::Error;
 pub enum Preset {
     /// The recommendation: at present the published pipeline for surfaces of every roughness.
     Default,
-    /// The pipeline that AMD published in 2021, with the constants it was published with.
+    /// The pipeline that AMD published in 2021, with the constants it was published with, for a ray a pixel.
     Reference,
 }
 
@@ -145,7 +145,7 @@ impl Default for Conventions {
 pub enum Fallback {
     /// No radiance.
     Black,
-    /// The noisy input as it is.
+    /// The noisy input as it is. Where only listed rays are traced, that is whatever the renderer left there.
     #[default]
     Input,
     /// Black in the sky; elsewhere the `environment` input in the mirror direction, blurred by roughness.
@@ -160,7 +160,7 @@ pub enum RaysPerQuad {
     One,
     /// Two rays on the diagonal of each 2x2 pixels.
     Two,
-    /// A ray for every pixel that reflects.
+    /// A ray for every pixel that is denoised.
     #[default]
     Four,
 }
@@ -263,11 +263,11 @@ numeric_settings! {
         disocclusion_normal_falloff = 1.4, 0.0 to 1000.0;
         /// How much relative difference of depth lowers the trust in history, as an exponent.
         disocclusion_depth_falloff = 1.0, 0.0 to 1000.0;
-        /// Trust, 0 to 1, below which there is no history.
+        /// Trust, 0 to 1, below which there is no history. At 1 rounding rejects static pixels.
         disocclusion_threshold = 0.9, 0.0 to 1.0;
         /// The same for single texels at edges, as a fraction of the threshold.
         disocclusion_tap_fraction = 0.5, 0.0 to 1.0;
-        /// Longest history on rough surfaces, in frames.
+        /// Longest history on rough surfaces, in frames. Stored in steps of `1 / floor(255 / max_history)`.
         max_history = 32.0, 1.0 to 255.0;
         /// Longest history on mirrors, in frames, not above `max_history`.
         min_history_cap = 8.0, 1.0 to 255.0;
@@ -308,13 +308,14 @@ numeric_settings! {
 numeric_settings! {
     /// Constants of the temporal resolve pass.
     Resolve in "resolve" {
-        /// Size of the box that history is clipped to: 0 is responsive and noisy, 1 stable and slow.
+        /// Size of the box that history and, around the 8x8 average, the new colour are clipped to: 0 is
+        /// responsive, 1 stable and slow.
         stability = 0.7, 0.0 to 1.0;
         /// Factor on that size.
         clip_scale = 1.4, 0.0 to 1000.0;
         /// How far the box moves from the neighbourhood's mean to the 8x8 average.
         clip_average_pull = 0.2, 0.0 to 1.0;
-        /// Smallest half size of the box, in exposed radiance.
+        /// Added to the half size of the box, in exposed radiance.
         clip_extent_floor = 0.001, 0.000001 to 65504.0;
     }
 }

@@ -138,6 +138,10 @@ fn every_hazard_has_a_barrier() {
     assert!(has("classify", "tiles") && has("classify", "guide"));
     // Read by both: no barrier.
     assert!(!has("prefilter", "guide") && !has("resolve_temporal", "average") && !has("resolve_temporal", "tiles"));
+    // Grids wait for their buffer too, once: later passes read it behind the same barrier.
+    let grids = barriers.iter().flatten().filter(|barrier| barrier.after == Usage::Indirect);
+    assert_eq!(grids.map(|barrier| barrier.resource.as_str()).collect::<Vec<_>>(), ["args"]);
+    assert!(has("indirect_args", "args"));
     for barrier in barriers.iter().flatten() {
         let writes = |usage| matches!(usage, Usage::Kernel(Access::Write | Access::ReadWrite));
         assert!(writes(barrier.before) || writes(barrier.after), "{barrier:?}");
@@ -186,14 +190,14 @@ fn bad_input_is_refused_by_name_and_changes_nothing() {
     refuse(&|i| i.exposure = 0.0, "`exposure` is 0");
     refuse(&|i| i.exposure = f32::NAN, "`exposure` is NaN");
     refuse(&|i| i.camera.jitter.x = f32::INFINITY, "jitter.x");
-    refuse(&|i| i.camera.world_to_view = Mat4::ZERO, "world_to_view` is singular");
+    refuse(&|i| i.camera.world_to_view = Mat4::ZERO, "world_to_view` is not a rigid motion");
     refuse(&|i| i.camera.world_to_view.x_axis.x = f32::NAN, "world_to_view` has entries");
     refuse(&|i| i.camera.view_to_clip.x_axis.x = 0.0, "view_to_clip` is singular");
     refuse(&|i| i.camera.view_to_clip.x_axis.z = 0.1, "oblique");
     // Still at the first frame.
     let schedule = denoiser.next_frame(&good).unwrap();
-    assert_eq!((schedule.phase, schedule.constants.history_valid), (0, 0));
-    assert_eq!(denoiser.next_frame(&good).unwrap().constants.history_valid, 1);
+    assert_eq!((schedule.phase, schedule.constants.prev_size), (0, [0, 0]));
+    assert_eq!(denoiser.next_frame(&good).unwrap().constants.prev_size, [64, 64]);
 
     let mut settings = Settings::default();
     settings.reproject.max_history = 0.5;
@@ -215,8 +219,8 @@ fn constants_change_without_a_new_plan() {
     settings.resolve.stability = 0.25;
     assert!(!denoiser.set_settings(&settings).unwrap());
     let constants = denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap().constants;
-    assert_eq!((constants.stability, constants.history_valid), (0.25, 1));
+    assert_eq!((constants.stability, constants.prev_size), (0.25, size.to_array()));
     settings.coverage.fallback = Fallback::Black;
     assert!(denoiser.set_settings(&settings).unwrap());
-    assert_eq!(denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap().constants.history_valid, 0);
+    assert_eq!(denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap().constants.prev_size, [0, 0]);
 }

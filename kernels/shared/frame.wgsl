@@ -22,10 +22,8 @@ struct Frame {
     motion_offset: vec2<f32>,
     jitter_uv: vec2<f32>,
     size: vec2<u32>,
+    // 0 when there is no usable history (first frame, camera cut).
     prev_size: vec2<u32>,
-    // 0: there is no usable history (first frame, camera cut).
-    history_valid: u32,
-    frame_index: u32,
     exposure: f32,
     inverse_exposure: f32,
 
@@ -63,7 +61,6 @@ struct Frame {
     // Steps per frame in which a history length is stored, a whole number.
     history_length_steps: f32,
     padding: f32,
-    padding_to_16_bytes: vec2<f32>,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -10,7 +10,7 @@ const WINDOW_BORDER: u32 = 4u;
 
 // Per pixel of the window: radiance, and 1 where it counts.
 var<workgroup> window_radiance: array<vec2<u32>, 256>;
-// Per pixel of the 8x16 row sums: weighted radiance and weight; weighted squared radiance.
+// Sums along rows, 8 in each of the 16 rows: weighted radiance and weight; weighted squared radiance.
 var<workgroup> row_sum: array<vec4<f32>, 128>;
 var<workgroup> row_square_sum: array<vec4<f32>, 128>;
 
@@ -38,7 +38,7 @@ fn neighborhood_weight(offset: i32) -> f32 {
     return frame.neighborhood_weights[distance - 1];
 }
 
-// To be called by the whole workgroup, between a barrier after the last `store_window` and another one.
+// Called by the whole workgroup after a barrier that follows `store_window`, and followed by a barrier.
 fn sum_rows(lane: u32) {
     for (var pass_index = 0u; pass_index < 2u; pass_index++) {
         let entry = lane + 64u * pass_index;

@@ -33,6 +33,11 @@ fn alpha_of(roughness: f32) -> f32 {
     return roughness * roughness;
 }
 
+// Roughness as a guide keeps it, so that thresholds mean the same in every pass.
+fn quantized_roughness(roughness: f32) -> f32 {
+    return round(saturate(roughness) * 1023.0) * (1.0 / 1023.0);
+}
+
 // Octahedral map of the unit sphere, Meyer et al. 2010, to -1..1 in x and y.
 fn oct_encode(n: vec3<f32>) -> vec2<f32> {
     let p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
@@ -93,7 +98,8 @@ struct Reprojected {
 fn pack_reprojected(r: Reprojected) -> vec2<u32> {
     let half_words = pack_radiance(r.radiance, 0.0);
     let length = u32(round(clamp(r.length * frame.history_length_steps, 0.0, 255.0)));
-    let variance = u32(round(sqrt(saturate(r.variance)) * 255.0));
+    // However small, variance is not none: the prefilter leaves pixels alone that have none.
+    let variance = max(u32(round(sqrt(saturate(r.variance)) * 255.0)), select(0u, 1u, r.variance > 0.0));
     return vec2<u32>(half_words.x, (half_words.y & 0xffffu) | (length << 16u) | (variance << 24u));
 }
 

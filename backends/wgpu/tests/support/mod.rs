@@ -233,14 +233,8 @@ pub(crate) struct Pixel {
 }
 
 /// A rough white wall, 4 units away, that faces the camera.
-pub(crate) const WALL: Pixel = Pixel {
-    radiance: Vec3::ONE,
-    hit_distance: 0.0,
-    normal: Vec3::Z,
-    roughness: 0.8,
-    depth: 4.0,
-    motion: Vec2::ZERO,
-};
+pub(crate) const WALL: Pixel =
+    Pixel { radiance: Vec3::ONE, hit_distance: 0.0, normal: Vec3::Z, roughness: 0.8, depth: 4.0, motion: Vec2::ZERO };
 
 /// No surface, in linear depth.
 pub(crate) const SKY: Pixel = Pixel { depth: 0.0, ..WALL };

@@ -1,0 +1,187 @@
+//! The `limpid` command as its users run it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use limpid_cli::sequence::{ChannelNames, Sequence, read_rgb};
+
+/// A folder of its own for a test, removed at the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("limpid-{name}-{}", std::process::id()));
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn join(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn limpid(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_limpid")).args(arguments).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Runs a command that must succeed; `None` if there is no device to run it on.
+fn succeeds(arguments: &[&str]) -> Option<String> {
+    let output = limpid(arguments);
+    let errors = text(&output.stderr);
+    if errors.contains("no Vulkan, Metal or Direct3D 12 device was found") {
+        assert!(std::env::var_os("LIMPID_REQUIRE_DEVICE").is_none(), "{errors}");
+        eprintln!("SKIPPED: {errors}");
+        return None;
+    }
+    assert!(output.status.success(), "{arguments:?}: {errors}");
+    Some(text(&output.stdout))
+}
+
+/// Runs a command that must fail with an exit code and a message that contains all of `expected`.
+fn fails(arguments: &[&str], code: i32, expected: &[&str]) {
+    let output = limpid(arguments);
+    let errors = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {errors}");
+    for part in expected {
+        assert!(errors.contains(part), "{arguments:?}: `{part}` is not in: {errors}");
+    }
+    assert!(!errors.contains("panicked"), "{errors}");
+}
+
+fn path(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// A tiny demo in `out`.
+fn demo<'a>(out: &'a str, more: &[&'a str]) -> Option<serde_json::Value> {
+    let base = ["demo", "--size", "64x36", "--frames", "4", "--samples", "16", "--json", "--out", out];
+    let output = succeeds(&[&base, more].concat())?;
+    Some(serde_json::from_str(&output).unwrap())
+}
+
+#[test]
+fn usage_is_explained_and_mistakes_have_code_two() {
+    let help = limpid(&["--help"]);
+    assert!(help.status.success());
+    for command in ["demo", "denoise", "plan"] {
+        assert!(text(&help.stdout).contains(command));
+        assert!(limpid(&[command, "--help"]).status.success());
+    }
+    fails(&["denoise"], 2, &["--out", "SEQUENCE"]);
+    fails(&["demo", "--size", "0x3"], 2, &["0x3"]);
+    fails(&["demo", "--size", "big"], 2, &["WIDTHxHEIGHT", "320x180"]);
+    fails(&["demo", "--scene", "nowhere"], 1, &["nowhere", "gallery"]);
+    fails(&["plan", "--set", "resolve.stability=7"], 1, &["resolve.stability", "7", "0.0 to 1.0"]);
+    fails(&["plan", "--settings", "no-such-file.toml"], 1, &["no-such-file.toml"]);
+}
+
+#[test]
+fn plans_are_printed() {
+    let plan = succeeds(&["plan", "--preset", "reference", "--size", "640x360"]).unwrap();
+    assert!(plan.contains("reproject") && plan.contains("6 dispatches"), "{plan}");
+    let json = succeeds(&["plan", "--json", "--set", "coverage.fallback=environment"]).unwrap();
+    let plan: limpid::Plan = serde_json::from_str(&json).unwrap();
+    assert!(plan.inputs().any(|input| input == "environment"));
+}
+
+#[test]
+fn the_demo_denoises_and_replaces_nothing_unasked() {
+    let folder = Folder::new("demo");
+    let out = folder.join("out");
+    let Some(report) = demo(path(&out), &[]) else { return };
+    assert_eq!(report["frames"], 4);
+    // A tenth of the noisy input's squared error, which its fireflies dominate.
+    let relmse = |which: &str| report[which]["mean"]["relmse"].as_f64().unwrap();
+    assert!(relmse("denoised") < 0.1 * relmse("noisy"), "{report}");
+    assert_eq!(report["denoised"]["mean"]["non_finite"], 0);
+    for file in ["animation.png", "comparison.png", "strip.png", "noisy/camera.json", "denoised/frame_0003.exr"] {
+        assert!(out.join(file).is_file(), "{file}");
+    }
+    let before = fs::read(out.join("comparison.png")).unwrap();
+    fails(&["demo", "--size", "64x36", "--frames", "4", "--out", path(&out)], 1, &["exists", "--force"]);
+    assert_eq!(fs::read(out.join("comparison.png")).unwrap(), before);
+    // The same again gives the same.
+    demo(path(&out), &["--force"]).unwrap();
+    assert_eq!(fs::read(out.join("comparison.png")).unwrap(), before);
+
+    // What it wrote can be denoised from disk, with the same result up to the half floats of the file.
+    let again = folder.join("again");
+    succeeds(&["denoise", path(&out.join("noisy")), "--out", path(&again), "--png"]).unwrap();
+    for number in 0..4 {
+        let name = format!("frame_{number:04}.exr");
+        let (_, a) = read_rgb(&out.join("denoised").join(&name)).unwrap();
+        let (_, b) = read_rgb(&again.join(&name)).unwrap();
+        let error: f32 = a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (a - b).abs() / (1.0 + a)).sum();
+        assert!(error / (3.0 * a.len() as f32) < 1e-3, "{name}: mean error {error}");
+        assert!(again.join(&name).with_extension("png").is_file());
+    }
+}
+
+#[test]
+fn fewer_rays_cost_error() {
+    let folder = Folder::new("rays");
+    let mut psnr = Vec::new();
+    for (rays, per_pixel) in [("1", 0.25..0.4), ("2", 0.5..0.6), ("4", 0.99..1.01)] {
+        let Some(report) = demo(path(&folder.join(rays)), &["--rays-per-quad", rays]) else { return };
+        let traced = report["rays_per_pixel"].as_f64().unwrap();
+        assert!(per_pixel.contains(&traced), "{rays} rays per quad: {traced} per pixel");
+        psnr.push(report["denoised"]["mean"]["psnr"].as_f64().unwrap());
+    }
+    assert!(psnr[0] < psnr[1] && psnr[1] < psnr[2], "{psnr:?}");
+    // Listing every ray is the same as tracing all.
+    let all = demo(path(&folder.join("all")), &[]).unwrap();
+    assert_eq!(all["denoised"]["mean"]["psnr"].as_f64().unwrap(), psnr[2]);
+    // Extra rays where the image varies.
+    let extra = demo(path(&folder.join("extra")), &["--rays-per-quad", "1", "--extra-rays-above", "0.05"]).unwrap();
+    assert!(extra["rays_per_pixel"].as_f64().unwrap() > 0.3, "{extra}");
+}
+
+#[test]
+fn bad_sequences_are_refused_and_finished_frames_stay() {
+    let folder = Folder::new("bad");
+    let demo_out = folder.join("demo");
+    if demo(path(&demo_out), &[]).is_none() {
+        return;
+    }
+    let noisy = demo_out.join("noisy");
+    let sequence = path(&noisy);
+    let out = folder.join("out");
+    let denoise = |more: &[&str], expected: &[&str]| {
+        fails(&[&["denoise", sequence, "--out", path(&out)], more].concat(), 1, expected);
+    };
+    fails(&["denoise", "no-such-folder", "--out", path(&out)], 1, &["no-such-folder"]);
+    fails(&["denoise", sequence, "--out", sequence, "--force"], 1, &["folder of the sequence itself"]);
+    denoise(&["--channel", "depth=Depth.Z"], &["Depth.Z", "frame_0000.exr", "reflection.R"]);
+    denoise(&["--channel", "deep=Z"], &["deep"]);
+
+    // A file that breaks off: what came before it is written and whole.
+    let third = noisy.join("frame_0002.exr");
+    let whole = fs::read(&third).unwrap();
+    fs::write(&third, &whole[..whole.len() / 2]).unwrap();
+    denoise(&[], &["frame_0002.exr"]);
+    assert_eq!(read_rgb(&out.join("frame_0001.exr")).unwrap().0, glam::UVec2::new(64, 36));
+    assert!(!out.join("frame_0002.exr").exists());
+    denoise(&[], &["frame_0000.exr exists", "--force"]);
+    fs::write(&third, &whole).unwrap();
+
+    let camera = noisy.join("camera.json");
+    let good = fs::read_to_string(&camera).unwrap();
+    let mut json: serde_json::Value = serde_json::from_str(&good).unwrap();
+    json["frames"][1]["proj"][0] = serde_json::json!([0, 0, 0, 0]);
+    fs::write(&camera, json.to_string()).unwrap();
+    denoise(&["--force"], &["camera.json", "proj"]);
+    fs::write(&camera, &good).unwrap();
+    assert_eq!(Sequence::open(&noisy, &ChannelNames::default()).unwrap().len(), 4);
+    succeeds(&["denoise", sequence, "--out", path(&out), "--force"]).unwrap();
+}
