@@ -28,8 +28,9 @@ fn chaos(size: UVec2, seed: u32) -> Scene {
 #[test]
 fn any_size_gives_finite_output_of_chaos() {
     let Some(gpu) = Gpu::open() else { return };
+    let mut run = Run::new(&gpu, &linear_settings(), UVec2::ONE);
     for size in SIZES {
-        let mut run = Run::new(&gpu, &linear_settings(), size);
+        run.denoiser.resize(size).unwrap();
         for seed in 0..3 {
             run.still(&chaos(size, seed)).assert_usable(&format!("{size}, frame {seed}"));
         }
@@ -42,8 +43,9 @@ fn constant_radiance_stays_what_it_is_in_every_pixel() {
     let mut settings = linear_settings();
     settings.coverage.fallback = Fallback::Input;
     settings.coverage.roughness_threshold = 0.9;
+    let mut run = Run::new(&gpu, &settings, UVec2::ONE);
     for size in SIZES {
-        let mut run = Run::new(&gpu, &settings, size);
+        run.denoiser.resize(size).unwrap();
         // Some pixels and some whole tiles are left out, and hold the same as the denoised ones.
         let scene = Scene::new(size, |p| {
             let (tile, pixel) = (noise(1, p / 8), noise(2, p));
@@ -67,14 +69,15 @@ fn constant_radiance_stays_what_it_is_in_every_pixel() {
 #[test]
 fn nothing_outside_the_frame_is_read() {
     let Some(gpu) = Gpu::open() else { return };
-    let settings = linear_settings();
+    let mut exact = Run::new(&gpu, &linear_settings(), UVec2::ONE);
+    let mut roomy = Run::new(&gpu, &linear_settings(), UVec2::ONE);
     for (size, allocated) in [
         (UVec2::new(1, 1), UVec2::new(9, 1)),
         (UVec2::new(33, 17), UVec2::new(64, 64)),
         (UVec2::new(61, 40), UVec2::new(62, 99)),
     ] {
-        let mut exact = Run::new(&gpu, &settings, size);
-        let mut roomy = Run::new(&gpu, &settings, allocated);
+        exact.denoiser.resize(size).unwrap();
+        roomy.denoiser.resize(allocated).unwrap();
         // Leaves something in all of limpid's own textures and buffers.
         roomy.still(&Scene::new(allocated, |p| Pixel { radiance: Vec3::splat(1000.0) * noise(0, p), ..WALL }));
         for seed in 0..4 {

@@ -65,10 +65,9 @@ fn file_name(number: u32) -> String {
     format!("frame_{number:04}.exr")
 }
 
-fn list_scenes() {
-    for scene in scene::all() {
-        println!("{:<12}{}", scene.name, scene.description);
-    }
+fn list_scenes() -> Result<()> {
+    let lines = scene::all().into_iter().map(|scene| format!("{:<12}{}\n", scene.name, scene.description));
+    super::print(&lines.collect::<String>())
 }
 
 /// Frames one after another in a PNG that plays.
@@ -129,8 +128,7 @@ impl Demo {
 
     pub(super) fn run(&self) -> Result<()> {
         if self.list {
-            list_scenes();
-            return Ok(());
+            return list_scenes();
         }
         let Some(scene) = scene::by_name(&self.scene) else {
             let names: Vec<_> = scene::all().iter().map(|scene| scene.name).collect();

@@ -6,6 +6,8 @@ mod plan;
 mod report;
 mod settings;
 
+use std::io::Write;
+
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use glam::UVec2;
@@ -40,6 +42,14 @@ impl Cli {
             Command::Denoise(denoise) => denoise.run(),
             Command::Plan(plan) => plan.run(),
         }
+    }
+}
+
+/// Writes to standard output. A reader that has seen enough is no error.
+fn print(text: &str) -> Result<()> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
     }
 }
 

@@ -24,13 +24,11 @@ pub(super) struct PlanCommand {
 impl PlanCommand {
     pub(super) fn run(&self) -> Result<()> {
         let (plan, _) = Plan::new(&self.settings.load()?, self.size)?;
-        if self.json {
-            println!("{}", serde_json::to_string_pretty(&plan)?);
+        let barriers: usize = plan.barriers().iter().map(Vec::len).sum();
+        super::print(&if self.json {
+            serde_json::to_string_pretty(&plan)? + "\n"
         } else {
-            let barriers: usize = plan.barriers().iter().map(Vec::len).sum();
-            print!("{plan}");
-            println!("{} dispatches and {barriers} barriers a frame", plan.passes.len());
-        }
-        Ok(())
+            format!("{plan}{} dispatches and {barriers} barriers a frame\n", plan.passes.len())
+        })
     }
 }

@@ -1,6 +1,7 @@
 //! What a run measured, for people and for scripts.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::time::Duration;
 
 use serde::Serialize;
@@ -134,28 +135,28 @@ impl Recorder {
 impl Report {
     /// Prints to standard output, as tables or as JSON.
     pub(super) fn print(&self, json: bool) -> anyhow::Result<()> {
-        if json {
-            println!("{}", serde_json::to_string_pretty(self)?);
-            return Ok(());
-        }
+        super::print(&if json { serde_json::to_string_pretty(self)? + "\n" } else { self.to_string() })
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (title, scores) in [("noisy input", &self.noisy), ("denoised", &self.denoised)] {
             if let Some(scores) = scores {
-                println!("{}", metrics::table(title, &scores.frames));
+                writeln!(f, "{}", metrics::table(title, &scores.frames))?;
             }
         }
-        println!(
-            "{} at {}x{}, {} frames, {:.2} rays per pixel",
-            self.name, self.width, self.height, self.frames, self.rays_per_pixel
-        );
-        println!("{:.2} bytes per pixel, {} dispatches per frame", self.bytes_per_pixel, self.dispatches_per_frame);
-        let timed = self.passes.iter().filter_map(|pass| Some((&pass.kernel, pass.milliseconds?)));
-        for (kernel, milliseconds) in timed {
-            println!("  {kernel:<18}{milliseconds:9.3} ms");
+        let Self { name, width, height, frames, rays_per_pixel, bytes_per_pixel, dispatches_per_frame, .. } = self;
+        writeln!(f, "{name} at {width}x{height}, {frames} frames, {rays_per_pixel:.2} rays per pixel")?;
+        writeln!(f, "{bytes_per_pixel:.2} bytes per pixel, {dispatches_per_frame} dispatches per frame")?;
+        for pass in &self.passes {
+            if let Some(milliseconds) = pass.milliseconds {
+                writeln!(f, "  {:<18}{milliseconds:9.3} ms", pass.kernel)?;
+            }
         }
         if let Some(milliseconds) = self.milliseconds_per_frame {
-            println!("  {:<18}{milliseconds:9.3} ms", "whole frame");
+            writeln!(f, "  {:<18}{milliseconds:9.3} ms", "whole frame")?;
         }
-        println!("on {}", self.device);
-        Ok(())
+        writeln!(f, "on {}", self.device)
     }
 }
