@@ -34,5 +34,5 @@ fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     if FALLBACK == 2u {
         guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
     }
-    textureStore(out_output, pixel, vec4<f32>(fallback_radiance(pixel, guide), 0.0));
+    textureStore(out_output, pixel, rounded_to_half(vec4<f32>(fallback_radiance(pixel, guide), 0.0)));
 }

@@ -317,6 +317,6 @@ fn reproject(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     if lane == 0u {
         let total = row_sum[0];
         let average = min(total.rgb / max(total.a, 1e-12), vec3<f32>(HALF_MAX));
-        textureStore(out_average, tile, vec4<f32>(average, 1.0));
+        textureStore(out_average, tile, rounded_to_half(vec4<f32>(average, 1.0)));
     }
 }

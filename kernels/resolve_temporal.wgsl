@@ -89,5 +89,5 @@ fn resolve_temporal(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invo
     } else {
         result = vec4<f32>(fallback_radiance(pixel, guide), 0.0);
     }
-    textureStore(out_output, pixel, result);
+    textureStore(out_output, pixel, rounded_to_half(result));
 }

@@ -11,7 +11,8 @@ override FALLBACK: u32 = 1u;
 @group(0) @binding(6) var in_environment: texture_2d<f32>;
 
 fn environment_level(direction: vec3<f32>, level: u32) -> vec3<f32> {
-    let size = textureDimensions(in_environment, level);
+    // Not the size of `level` itself: lavapipe answers for one pixel's level in the place of all.
+    let size = max(textureDimensions(in_environment, 0) >> vec2<u32>(level), vec2<u32>(1u));
     let uv = vec2<f32>(atan2(direction.x, -direction.z) * 0.15915494 + 0.5, acos(clamp(direction.y, -1.0, 1.0)) * 0.31830989);
     let texel = uv * vec2<f32>(size) - 0.5;
     let base = vec2<i32>(floor(texel));

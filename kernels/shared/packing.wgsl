@@ -86,6 +86,12 @@ fn unpack_radiance(packed: vec2<u32>) -> vec4<f32> {
     return vec4<f32>(unpack2x16float(packed.x), unpack2x16float(packed.y));
 }
 
+// The nearest half floats. Storing to a half float texture may round towards zero instead, and does on some
+// drivers: kept as history, that darkens frame by frame.
+fn rounded_to_half(v: vec4<f32>) -> vec4<f32> {
+    return vec4<f32>(unpack2x16float(pack2x16float(v.xy)), unpack2x16float(pack2x16float(v.zw)));
+}
+
 // Reprojected history: radiance in three half floats, history length and variance in 8 bits each.
 struct Reprojected {
     radiance: vec3<f32>,

@@ -335,8 +335,9 @@ impl Denoiser {
         self.allocations.buffer(self.core.plan(), resource)
     }
 
-    /// Calls back with the time of each pass of the frame recorded last, once that frame has been submitted
-    /// and the device has been polled. Does nothing without [`Options::timestamps`].
+    /// Calls back with the time of each pass of the frame recorded last, once the device has been polled. To be
+    /// called after that frame was submitted and before the next is recorded. Does nothing without
+    /// [`Options::timestamps`].
     pub fn read_times(&self, callback: impl FnOnce(Vec<PassTime>) + Send + 'static) {
         if let Some(timing) = &self.timing {
             timing.read(callback);

@@ -87,7 +87,7 @@ impl Timing {
         }
     }
 
-    /// Calls back with the times of the frame recorded last, once it has been submitted and the device polled.
+    /// Calls back with the times of the frame recorded and submitted last, once the device has been polled.
     pub(crate) fn read(&self, callback: impl FnOnce(Vec<PassTime>) + Send + 'static) {
         let Some(slot) = self.latest.map(|index| &self.slots[index]) else { return };
         if slot.state.swap(MAPPED, Ordering::AcqRel) != RECORDED {

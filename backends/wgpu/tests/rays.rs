@@ -58,14 +58,15 @@ fn index(p: UVec2) -> usize {
 fn classify(run: &mut Run<'_>, scene: &Scene) -> Vec<Ray> {
     let images = scene.upload(run.gpu);
     let mut encoder = run.gpu.encoder();
-    run.denoiser.encode_classify(&run.gpu.queue, &mut encoder, &images.inputs(), &still_frame(SIZE)).unwrap();
+    run.denoiser.encode_classify(&run.gpu.queue, &mut encoder, &images.inputs(), &still_frame(scene.size)).unwrap();
     run.gpu.queue.submit([encoder.finish()]);
     let list = run.denoiser.ray_list().unwrap();
     let args = run.gpu.read_words(list.args);
     let words = run.gpu.read_words(list.rays);
     let &[x, y, z, count] = &args[list.args_offset as usize / 4..][..4] else { unreachable!() };
-    assert!(x * y * z * 64 >= count && x <= 4096 && y <= 65535 && z == 1, "grid {x}x{y}x{z} for {count} rays");
-    assert!(x * y * z * 64 < count + 4096 * 64, "grid {x}x{y}x{z} for {count} rays");
+    // 64 rays a workgroup, 4096 workgroups a row.
+    let groups = count.div_ceil(64);
+    assert_eq!([x, y, z], [groups.min(4096), groups.div_ceil(4096), 1], "grid for {count} rays");
     let ray = |word: &u32| {
         let pixel = UVec2::new(word & 0x3fff, (word >> 14) & 0x3fff);
         let others = [UVec2::new(1, 0), UVec2::new(0, 1), UVec2::new(1, 1)];
@@ -189,4 +190,14 @@ fn pixels_that_vary_get_their_own_rays() {
             variance = run.read(&copies).output.iter().map(|texel| texel[3]).collect();
         }
     }
+}
+
+#[test]
+fn a_long_list_has_a_grid_of_several_rows() {
+    let Some(gpu) = Gpu::open() else { return };
+    let size = UVec2::new(1100, 300);
+    let mut run = Run::new(&gpu, &settings(RaysPerQuad::Four, None), size);
+    let rays = classify(&mut run, &Scene::new(size, |_| WALL));
+    let traced = sorted(rays.iter().map(|ray| ray.pixel).collect());
+    assert!(traced.into_iter().eq(positions(size)));
 }

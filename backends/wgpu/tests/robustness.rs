@@ -117,6 +117,27 @@ fn a_bad_pixel_stays_contained_and_is_forgotten() {
 }
 
 #[test]
+fn unusable_radiance_counts_as_no_light() {
+    let Some(gpu) = Gpu::open() else { return };
+    let mut run = Run::new(&gpu, &linear_settings(), SIZE);
+    let mut with_radiance_at_bad_pixels = |radiance: Vec3| {
+        let frames = (0..3).map(|index| {
+            let mut scene = scene(index);
+            positions(SIZE).filter(|p| noise(index, *p) < 0.1).for_each(|p| scene.at(p).radiance = radiance);
+            let mut frame = support::still_frame(SIZE);
+            frame.reset = index == 0;
+            run.frame(&scene, &frame)
+        });
+        frames.collect::<Vec<_>>()
+    };
+    let expected = with_radiance_at_bad_pixels(Vec3::ZERO);
+    let one_channel = Vec3::new(3.0, f32::NAN, 5.0);
+    for radiance in [Vec3::NAN, one_channel, Vec3::INFINITY, Vec3::NEG_INFINITY, Vec3::splat(-50.0)] {
+        assert!(with_radiance_at_bad_pixels(radiance) == expected, "{radiance}");
+    }
+}
+
+#[test]
 fn a_wholly_bad_frame_is_forgotten() {
     // The largest radiance is 65504, and less than halves each frame.
     const LAST_FRAME: u32 = 24;

@@ -221,6 +221,11 @@ pub(crate) fn noise(seed: u32, p: UVec2) -> f32 {
     (state >> 8) as f32 / (1 << 24) as f32
 }
 
+/// Where in its pixel a jittered camera samples.
+pub(crate) fn jitter_of(frame: u32) -> Vec2 {
+    Vec2::new(noise(1, UVec2::splat(frame)), noise(2, UVec2::splat(frame))) - 0.5
+}
+
 /// What the textures of a scene hold at a pixel, as they hold it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Pixel {
@@ -305,12 +310,12 @@ impl Scene {
 
     /// The same frame at the top left of larger images that hold `rest` elsewhere.
     pub(crate) fn inside(&self, allocated: UVec2, rest: Pixel) -> Self {
-        let pixel = |p: UVec2| if p.cmplt(self.size).all() { *self.clone_at(p) } else { rest };
+        let pixel = |p: UVec2| if p.cmplt(self.size).all() { self.pixel_at(p) } else { rest };
         Self { roughness_channel: self.roughness_channel, ..Self::new(allocated, pixel) }
     }
 
-    fn clone_at(&self, p: UVec2) -> &Pixel {
-        &self.pixels[(p.y * self.size.x + p.x) as usize]
+    fn pixel_at(&self, p: UVec2) -> Pixel {
+        self.pixels[(p.y * self.size.x + p.x) as usize]
     }
 
     pub(crate) fn upload(&self, gpu: &Gpu) -> Images {
