@@ -1,7 +1,7 @@
 //! The wgpu backend: uploads a frame, records, submits, reads back.
 
 use std::sync::mpsc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
 use glam::UVec2;
@@ -10,7 +10,7 @@ use limpid::settings::DepthEncoding;
 use limpid::{FrameInputs, Plan, Settings};
 use limpid_wgpu::{Denoiser, Inputs, Options, PassTime};
 
-use super::{Backend, Denoised, ListedRay, Tracer, trace_listed};
+use super::{Backend, Denoised, ListedRay, Tracer, timed, to_half, trace_listed};
 use crate::sequence::Frame;
 
 /// An input image on the device.
@@ -111,12 +111,6 @@ impl Images {
     }
 }
 
-/// Half floats, with finite numbers that are too large as the largest there is.
-fn to_half(value: f32) -> f16 {
-    let clamped = if value.is_finite() { value.clamp(-65504.0, 65504.0) } else { value };
-    f16::from_f32(clamped)
-}
-
 impl Gpu {
     pub(super) fn open(settings: &Settings, size: UVec2) -> Result<Self> {
         // Sequences hold linear depth.
@@ -188,15 +182,15 @@ impl Gpu {
         self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
-    /// Runs what was recorded and returns how long that took, waiting included.
-    fn run(&self, encoder: wgpu::CommandEncoder) -> Result<Duration> {
+    /// Runs what was recorded and adds how long that took, waiting included.
+    fn run(&self, encoder: wgpu::CommandEncoder, time: &mut Duration, cpu_time: &mut Duration) -> Result<()> {
         // Uploads are not part of it.
         self.queue.submit([]);
         self.wait()?;
-        let start = Instant::now();
-        self.queue.submit([encoder.finish()]);
-        self.wait()?;
-        Ok(start.elapsed())
+        timed(time, cpu_time, || {
+            self.queue.submit([encoder.finish()]);
+            self.wait()
+        })
     }
 
     fn classified_rays(&self) -> Result<Vec<ListedRay>> {
@@ -264,10 +258,10 @@ impl Backend for Gpu {
         let mut encoder = self.encoder();
         self.denoiser.encode_classify(&self.queue, &mut encoder, &self.images.inputs(), &inputs)?;
         let mut rays = frame.depth.iter().filter(|depth| **depth > 0.0).count() as u64;
-        let mut time = Duration::ZERO;
+        let (mut time, mut cpu_time) = (Duration::ZERO, Duration::ZERO);
         let mut traced = None;
         if let Some(tracer) = tracer {
-            time += self.run(encoder)?;
+            self.run(encoder, &mut time, &mut cpu_time)?;
             let listed = self.classified_rays()?;
             rays = listed.len() as u64;
             let radiance = trace_listed(&listed, frame.size, tracer);
@@ -276,8 +270,8 @@ impl Backend for Gpu {
             encoder = self.encoder();
         }
         self.denoiser.encode_denoise(&mut encoder, &self.images.inputs())?;
-        time += self.run(encoder)?;
+        self.run(encoder, &mut time, &mut cpu_time)?;
         let radiance = self.read_output(frame.size)?;
-        Ok(Denoised { radiance, time, pass_times: self.read_times()?, rays, traced })
+        Ok(Denoised { radiance, time, cpu_time, pass_times: self.read_times()?, rays, traced })
     }
 }

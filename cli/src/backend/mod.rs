@@ -1,11 +1,15 @@
 //! What the commands run a plan on.
 
+mod cpu;
 mod gpu;
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use clap::ValueEnum;
+use cpu_time::ProcessTime;
 use glam::UVec2;
+use half::f16;
 use limpid::{Plan, Settings};
 
 use crate::sequence::Frame;
@@ -17,6 +21,8 @@ pub struct Denoised {
     pub radiance: Vec<[f32; 3]>,
     /// From submission until the device was done, uploads and read-back excluded.
     pub time: Duration,
+    /// Time that all processors together spent on it, for devices that are processors.
+    pub cpu_time: Duration,
     /// Time of each pass by the device's own clock, in the order of the plan. Empty where it has none.
     pub pass_times: Vec<(String, Duration)>,
     /// Rays that were traced for it.
@@ -45,13 +51,52 @@ pub trait Backend {
     fn denoise(&mut self, frame: &Frame, exposure: f32, tracer: Option<Tracer<'_>>) -> Result<Denoised>;
 }
 
-/// Opens the best device there is.
+/// Runs `work` and adds its duration and processor time.
+fn timed<T>(time: &mut Duration, cpu_time: &mut Duration, work: impl FnOnce() -> T) -> T {
+    let (start, cpu_start) = (Instant::now(), ProcessTime::now());
+    let result = work();
+    *time += start.elapsed();
+    *cpu_time += cpu_start.elapsed();
+    result
+}
+
+/// Which backend to run on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum Choice {
+    /// A device through wgpu if there is one, else the CPU.
+    #[default]
+    Auto,
+    /// wgpu: Vulkan, Metal or Direct3D 12.
+    Wgpu,
+    /// The CPU alone, without any driver.
+    Cpu,
+}
+
+/// Opens a backend for images of up to `size` pixels.
 ///
 /// # Errors
 ///
-/// When there is none, or settings or size are refused.
-pub fn open(settings: &Settings, size: UVec2) -> Result<Box<dyn Backend>> {
-    Ok(Box::new(gpu::Gpu::open(settings, size)?))
+/// When settings or size are refused, or there is no device of the kind asked for.
+pub fn open(choice: Choice, settings: &Settings, size: UVec2) -> Result<Box<dyn Backend>> {
+    // What limpid itself refuses, every backend would.
+    Plan::new(settings, size)?;
+    match choice {
+        Choice::Wgpu => Ok(Box::new(gpu::Gpu::open(settings, size)?)),
+        Choice::Cpu => Ok(Box::new(cpu::Cpu::open(settings, size)?)),
+        Choice::Auto => match gpu::Gpu::open(settings, size) {
+            Ok(gpu) => Ok(Box::new(gpu)),
+            Err(error) => {
+                eprintln!("note: running on the CPU, because {error:#}");
+                Ok(Box::new(cpu::Cpu::open(settings, size)?))
+            }
+        },
+    }
+}
+
+/// Half floats, with finite numbers that are too large as the largest there is.
+pub(crate) fn to_half(value: f32) -> f16 {
+    let clamped = if value.is_finite() { value.clamp(-65504.0, 65504.0) } else { value };
+    f16::from_f32(clamped)
 }
 
 /// An entry of the ray list: where to trace, and which neighbours in the 2x2 quad get a copy.

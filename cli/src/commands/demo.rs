@@ -13,7 +13,7 @@ use super::denoise::{check_outputs, comparison, create_dir, write_png};
 use super::parse_size;
 use super::report::Recorder;
 use super::settings::SettingsOptions;
-use crate::backend;
+use crate::backend::{self, Choice};
 use crate::picture;
 use crate::scene::{self, Scene};
 use crate::sequence::{self, Frame, Metadata};
@@ -50,6 +50,9 @@ pub(super) struct Demo {
     out: PathBuf,
     #[command(flatten)]
     settings: SettingsOptions,
+    /// What to run on.
+    #[arg(long, value_enum, default_value_t)]
+    backend: Choice,
     /// Replace files that exist.
     #[arg(long)]
     force: bool,
@@ -142,7 +145,7 @@ impl Demo {
             settings.coverage.ray_list = Some(list);
         }
         check_outputs(self.outputs().iter().map(PathBuf::as_path), self.force)?;
-        let mut backend = backend::open(&settings, self.size)?;
+        let mut backend = backend::open(self.backend, &settings, self.size)?;
         eprintln!(
             "scene {}: rendering {} frames of {}x{}, denoising on {}",
             scene.name,

@@ -9,7 +9,7 @@ use indicatif::ProgressBar;
 
 use super::report::{Recorder, noisy_radiance};
 use super::settings::SettingsOptions;
-use crate::backend;
+use crate::backend::{self, Choice};
 use crate::picture;
 use crate::sequence::{self, ChannelNames, Frame, Metadata, Sequence};
 
@@ -38,6 +38,9 @@ pub(super) struct Denoise {
     /// Also write a PNG of each frame: noisy, denoised and, if there is one, the reference.
     #[arg(long)]
     png: bool,
+    /// What to run on.
+    #[arg(long, value_enum, default_value_t)]
+    backend: Choice,
     /// Replace files that exist.
     #[arg(long)]
     force: bool,
@@ -111,7 +114,7 @@ impl Denoise {
         check_outputs(outputs.iter().map(|(exr, _)| exr.as_path()).chain(pictures), self.force)?;
         let exposure = self.exposure.unwrap_or(sequence.exposure());
 
-        let mut backend = backend::open(&settings, sequence.size())?;
+        let mut backend = backend::open(self.backend, &settings, sequence.size())?;
         eprintln!("denoising {} on {}", sequence.name(), backend.device());
         create_dir(&self.out)?;
         let mut recorder = Recorder::new(exposure);

@@ -46,6 +46,8 @@ pub(super) struct Report {
     dispatches_per_frame: usize,
     /// From submission to completion, mean over the frames after the first.
     milliseconds_per_frame: Option<f64>,
+    /// Time of all processors together.
+    cpu_milliseconds_per_frame: Option<f64>,
     passes: Vec<PassReport>,
     noisy: Option<Scores>,
     denoised: Option<Scores>,
@@ -59,6 +61,7 @@ pub(super) struct Recorder {
     noisy: Vec<FrameScore>,
     denoised: Vec<FrameScore>,
     total_time: Duration,
+    total_cpu_time: Duration,
     pass_times: BTreeMap<String, Duration>,
     timed_frames: u32,
     frames: usize,
@@ -79,6 +82,7 @@ impl Recorder {
             noisy: Vec::new(),
             denoised: Vec::new(),
             total_time: Duration::ZERO,
+            total_cpu_time: Duration::ZERO,
             pass_times: BTreeMap::new(),
             timed_frames: 0,
             frames: 0,
@@ -95,6 +99,7 @@ impl Recorder {
         if self.frames > 0 {
             self.timed_frames += 1;
             self.total_time += denoised.time;
+            self.total_cpu_time += denoised.cpu_time;
             for (kernel, time) in &denoised.pass_times {
                 *self.pass_times.entry(kernel.clone()).or_default() += *time;
             }
@@ -120,6 +125,7 @@ impl Recorder {
             bytes_per_pixel: plan.bytes_per_pixel(),
             dispatches_per_frame: plan.passes.len(),
             milliseconds_per_frame: (self.timed_frames > 0).then(|| milliseconds(&self.total_time)),
+            cpu_milliseconds_per_frame: (self.timed_frames > 0).then(|| milliseconds(&self.total_cpu_time)),
             passes: passes
                 .map(|pass| PassReport {
                     kernel: pass.kernel.clone(),
@@ -154,8 +160,8 @@ impl fmt::Display for Report {
                 writeln!(f, "  {:<18}{milliseconds:9.3} ms", pass.kernel)?;
             }
         }
-        if let Some(milliseconds) = self.milliseconds_per_frame {
-            writeln!(f, "  {:<18}{milliseconds:9.3} ms", "whole frame")?;
+        if let (Some(milliseconds), Some(cpu)) = (self.milliseconds_per_frame, self.cpu_milliseconds_per_frame) {
+            writeln!(f, "  {:<18}{milliseconds:9.3} ms, {cpu:.3} ms of processor time", "whole frame")?;
         }
         writeln!(f, "on {}", self.device)
     }

@@ -1,0 +1,225 @@
+//! Pointers, loads and stores.
+
+use naga::{AtomicFunction, Expression, Handle, ScalarKind, TypeInner};
+
+use super::{Compiler, Inlined, Place, Result, Root, Value, unsupported};
+use crate::layout::{element_count, part};
+use crate::op::{Atomic, Binary, Memory, Op, Operand};
+
+impl<'a> Compiler<'a> {
+    pub(super) fn texture(&mut self, frame: &Inlined<'a>, handle: Handle<Expression>) -> Result<u32> {
+        let value = match &frame.function.expressions[handle] {
+            Expression::GlobalVariable(global) => self.globals.get(global),
+            Expression::FunctionArgument(index) => frame.arguments.get(*index as usize),
+            _ => None,
+        };
+        match value {
+            Some(Value::Texture(texture)) => Ok(*texture),
+            _ => unsupported("a texture that is no global variable"),
+        }
+    }
+
+    /// What a pointer points to.
+    pub(super) fn place(&mut self, frame: &mut Inlined<'a>, handle: Handle<Expression>) -> Result<Place> {
+        if let Some(Value::Place(place)) = &frame.values[handle.index()] {
+            return Ok(place.clone());
+        }
+        match &frame.function.expressions[handle] {
+            Expression::GlobalVariable(global) => match self.globals.get(global) {
+                Some(Value::Place(place)) => Ok(place.clone()),
+                _ => unsupported("a pointer to a texture"),
+            },
+            Expression::LocalVariable(local) => {
+                let inner = self.module.types[frame.function.local_variables[*local].ty].inner.clone();
+                let root = Root::Variable(frame.locals[local]);
+                Ok(Place { root, inner, offset: 0, dynamic: Vec::new() })
+            }
+            Expression::FunctionArgument(index) => match &frame.arguments[*index as usize] {
+                Value::Place(place) => Ok(place.clone()),
+                _ => unsupported("a value as a pointer"),
+            },
+            Expression::AccessIndex { base, index } => {
+                let place = self.place(frame, *base)?;
+                self.part_of(place, *index)
+            }
+            Expression::Access { base, index } => {
+                let mut place = self.place(frame, *base)?;
+                let index = self.data(frame, *index)?[0];
+                if let Operand::Const(index) = index {
+                    let last = element_count(&place.inner).map_or(index, |count| count - 1);
+                    return self.part_of(place, index.min(last));
+                }
+                let Some(second) = part(self.module, &place.inner, 1) else {
+                    return unsupported(format!("an index into {:?}", place.inner));
+                };
+                let stride = if matches!(place.root, Root::Variable(_)) { second.scalars } else { second.words };
+                place.dynamic.push((index, stride, element_count(&place.inner)));
+                place.inner = second.inner;
+                Ok(place)
+            }
+            other => unsupported(format!("a pointer from {other:?}")),
+        }
+    }
+
+    fn part_of(&self, mut place: Place, index: u32) -> Result<Place> {
+        let Some(part) = part(self.module, &place.inner, index) else {
+            return unsupported(format!("a part of {:?}", place.inner));
+        };
+        place.offset += if matches!(place.root, Root::Variable(_)) { part.scalars } else { part.words };
+        place.inner = part.inner;
+        Ok(place)
+    }
+
+    /// The dynamic part of an address, in words.
+    fn address(&mut self, place: &Place) -> Operand {
+        let mut address = Operand::Const(0);
+        for &(index, stride, _) in &place.dynamic {
+            let scaled = self.binary(Binary::MulI, index, Operand::Const(stride));
+            let sum = self.binary(Binary::AddI, address, scaled);
+            self.release(&[address, scaled]);
+            address = sum;
+        }
+        address
+    }
+
+    /// The only index into a variable.
+    fn variable_index(&self, place: &Place) -> Result<(Operand, u32, u32)> {
+        match place.dynamic[..] {
+            [(index, stride, Some(count))] => Ok((index, stride, count)),
+            _ => unsupported("more than one dynamic index into a variable of a function"),
+        }
+    }
+
+    pub(super) fn load(&mut self, place: &Place) -> Result<Vec<Operand>> {
+        let offsets = self.offsets(&place.inner);
+        match place.root {
+            Root::Memory(memory) => {
+                let address = self.address(place);
+                // Only constant buffers hold the same for all: others change while the kernel runs.
+                let uniform = self.is_constant(memory);
+                let values = offsets
+                    .iter()
+                    .map(|offset| {
+                        let to =
+                            if uniform { self.result(&[address]) } else { Operand::Lane(self.registers.allocate()) };
+                        self.emit(Op::Load { to, memory, address, offset: place.offset + offset });
+                        to
+                    })
+                    .collect();
+                self.release(&[address]);
+                Ok(values)
+            }
+            Root::Variable(variable) => {
+                let count = self.count(&place.inner)?;
+                let (index, stride, elements) = self.variable_index(place)?;
+                let read = |compiler: &mut Self, scalar| {
+                    let base = compiler.variable_operand(variable, place.offset + scalar);
+                    let to = compiler.result(&[base, index]);
+                    compiler.emit(Op::ReadIndexed { to, base, stride, count: elements, index });
+                    to
+                };
+                Ok((0..count).map(|scalar| read(self, scalar)).collect())
+            }
+        }
+    }
+
+    fn is_constant(&self, memory: Memory) -> bool {
+        match memory {
+            Memory::Buffer(slot) => self.bindings[slot as usize].kind == super::SlotKind::Buffer { writable: false },
+            Memory::Workgroup => false,
+        }
+    }
+
+    pub(super) fn store(&mut self, place: &Place, operands: &[Operand]) -> Result<()> {
+        match place.root {
+            Root::Memory(memory) => {
+                let address = self.address(place);
+                let offsets = self.offsets(&place.inner);
+                for (offset, &a) in offsets.iter().zip(operands) {
+                    self.emit(Op::Store { memory, address, offset: place.offset + offset, a, mask: self.mask });
+                }
+                self.release(&[address]);
+            }
+            Root::Variable(variable) if place.dynamic.is_empty() => {
+                for (scalar, &operand) in operands.iter().enumerate() {
+                    self.assign(variable, place.offset + scalar as u32, operand);
+                }
+            }
+            Root::Variable(variable) => {
+                let (index, stride, count) = self.variable_index(place)?;
+                let lanes = |operand: &Operand| matches!(operand, Operand::Lane(_));
+                let declared = &self.variables[variable];
+                let must_vary = self.depth > declared.depth || operands.iter().any(lanes) || lanes(&index);
+                if must_vary && !declared.varying {
+                    self.mark_varying(variable);
+                    return Ok(());
+                }
+                let mask = if self.variables[variable].varying { self.mask } else { None };
+                for (scalar, &a) in operands.iter().enumerate() {
+                    let base = self.variable_operand(variable, place.offset + scalar as u32);
+                    self.emit(Op::WriteIndexed { base, stride, count, index, a, mask });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn atomic(
+        &mut self,
+        frame: &mut Inlined<'a>,
+        pointer: Handle<Expression>,
+        function: AtomicFunction,
+        value: Handle<Expression>,
+        wanted: bool,
+    ) -> Result<Option<Operand>> {
+        let place = self.place(frame, pointer)?;
+        let Root::Memory(memory) = place.root else { return unsupported("an atomic variable of a function") };
+        let signed = matches!(place.inner, TypeInner::Atomic(scalar) if scalar.kind == ScalarKind::Sint);
+        let op = match function {
+            AtomicFunction::Add => Atomic::Add,
+            AtomicFunction::Subtract => Atomic::Subtract,
+            AtomicFunction::And => Atomic::And,
+            AtomicFunction::ExclusiveOr => Atomic::Xor,
+            AtomicFunction::InclusiveOr => Atomic::Or,
+            AtomicFunction::Min => {
+                if signed {
+                    Atomic::MinI
+                } else {
+                    Atomic::MinU
+                }
+            }
+            AtomicFunction::Max => {
+                if signed {
+                    Atomic::MaxI
+                } else {
+                    Atomic::MaxU
+                }
+            }
+            AtomicFunction::Exchange { compare: None } => Atomic::Exchange,
+            AtomicFunction::Exchange { compare: Some(_) } => return unsupported("atomicCompareExchangeWeak"),
+        };
+        let a = self.data(frame, value)?[0];
+        let address = self.address(&place);
+        let to = wanted.then(|| self.registers.allocate());
+        self.emit(Op::Atomic { op, to, memory, address, offset: place.offset, a, mask: self.mask });
+        self.release(&[address]);
+        self.used(frame, value);
+        Ok(to.map(Operand::Lane))
+    }
+
+    pub(super) fn array_length(
+        &mut self,
+        frame: &mut Inlined<'a>,
+        pointer: Handle<Expression>,
+    ) -> Result<Vec<Operand>> {
+        let place = self.place(frame, pointer)?;
+        match (&place.root, &place.inner) {
+            (Root::Memory(Memory::Buffer(buffer)), TypeInner::Array { stride, .. }) => {
+                let to = self.scalar();
+                self.emit(Op::ArrayLength { to, buffer: *buffer, offset: place.offset, stride: stride / 4 });
+                Ok(vec![to])
+            }
+            _ => unsupported("arrayLength of what is no buffer"),
+        }
+    }
+}

@@ -1,0 +1,238 @@
+use std::collections::HashMap;
+
+use glam::UVec2;
+use limpid::plan::{Bound, Grid, OUTPUT, Pass, Stage};
+use limpid::resource::{Copy, Format, Kind};
+use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
+
+use crate::{Binding, Buffer, Error, Executor, TexelFormat, Texture};
+
+/// The caller's images of one frame, of any format. Encodings are set in
+/// [`Settings::conventions`](limpid::settings::Conventions).
+#[derive(Debug, Clone, Copy)]
+pub struct Inputs<'a> {
+    /// `rgb`: noisy radiance, `a`: hit distance.
+    pub radiance: &'a Texture,
+    /// World-space normal.
+    pub normal: &'a Texture,
+    /// Roughness, in the channel that the settings name.
+    pub roughness: &'a Texture,
+    /// Depth.
+    pub depth: &'a Texture,
+    /// Motion vectors in the first two channels.
+    pub motion: &'a Texture,
+    /// Equirectangular radiance with its mip chain. Only for `Fallback::Environment`.
+    pub environment: Option<&'a Texture>,
+}
+
+impl<'a> Inputs<'a> {
+    fn get(&self, name: &str) -> Option<&'a Texture> {
+        match name {
+            "radiance" => Some(self.radiance),
+            "normal" => Some(self.normal),
+            "roughness" => Some(self.roughness),
+            "depth" => Some(self.depth),
+            "motion" => Some(self.motion),
+            "environment" => self.environment,
+            _ => None,
+        }
+    }
+
+    fn check<'n>(&self, names: impl Iterator<Item = &'n str>, size: UVec2) -> Result<(), Error> {
+        for name in names {
+            let missing = || Error::InputMissing { input: name.to_owned() };
+            let actual = UVec2::from_array(self.get(name).ok_or_else(missing)?.size());
+            if name != "environment" && actual.cmplt(size).any() {
+                return Err(Error::InputSize { input: name.to_owned(), actual, expected: size });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A resource of the plan, one entry for each copy.
+enum Allocation {
+    Textures(Vec<Texture>),
+    Buffer(Buffer),
+}
+
+/// A denoiser on the CPU.
+pub struct Denoiser {
+    core: limpid::Denoiser,
+    executors: Vec<Executor>,
+    allocations: HashMap<String, Allocation>,
+    constants: Buffer,
+    /// The frame that was classified and not denoised yet.
+    pending: Option<FrameSchedule>,
+    phase: usize,
+}
+
+fn texel_format(format: Format) -> TexelFormat {
+    match format {
+        Format::Rgba16Float => TexelFormat::Rgba16Float,
+        Format::Rg32Uint => TexelFormat::Rg32Uint,
+    }
+}
+
+fn allocate(plan: &Plan) -> HashMap<String, Allocation> {
+    let allocate = |kind, ping_pong| match kind {
+        Kind::Texture { format, extent } => {
+            let size = extent.of(plan.size);
+            let texture = || Texture::new(texel_format(format), size.x, size.y);
+            Some(Allocation::Textures((0..=usize::from(ping_pong)).map(|_| texture()).collect()))
+        }
+        Kind::Buffer { stride, count, .. } => {
+            Some(Allocation::Buffer(Buffer::zeroed((stride / 4 * count.of(plan.size)) as usize)))
+        }
+        Kind::Constants | Kind::Input => None,
+    };
+    let named = plan.resources.iter().map(|r| (r.name.clone(), allocate(r.kind, r.ping_pong)));
+    named.filter_map(|(name, allocation)| Some((name, allocation?))).collect()
+}
+
+fn find_texture<'a>(
+    plan: &Plan,
+    allocations: &'a HashMap<String, Allocation>,
+    name: &str,
+    copy: Copy,
+    phase: usize,
+) -> Option<&'a Texture> {
+    match allocations.get(name)? {
+        Allocation::Textures(textures) => textures.get(copy.index(plan.resource(name)?.ping_pong, phase)),
+        Allocation::Buffer(_) => None,
+    }
+}
+
+impl Denoiser {
+    /// Compiles kernels and allocates memory for images of up to `size` pixels.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Limpid`] for settings or size; [`Error::Compile`] would be a defect of limpid.
+    pub fn new(settings: &Settings, size: UVec2) -> Result<Self, Error> {
+        let core = limpid::Denoiser::new(settings, size)?;
+        let compile = |kernel: &limpid::kernel::Kernel| {
+            Executor::new(&kernel.module, &kernel.info, kernel.name)
+                .map_err(|source| Error::Compile { kernel: kernel.name, source })
+        };
+        let executors = core.kernels().iter().map(compile).collect::<Result<_, _>>()?;
+        let allocations = allocate(core.plan());
+        let constants = Buffer::zeroed(size_of::<FrameConstants>() / 4);
+        Ok(Self { core, executors, allocations, constants, pending: None, phase: 0 })
+    }
+
+    /// What is allocated and dispatched.
+    pub fn plan(&self) -> &Plan {
+        self.core.plan()
+    }
+
+    /// Denoises a frame.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Limpid`] for `frame`, or one of the `Input` errors. Nothing has happened then.
+    pub fn denoise(&mut self, inputs: &Inputs<'_>, frame: &FrameInputs) -> Result<(), Error> {
+        self.run_classify(inputs, frame)?;
+        self.run_denoise(inputs)
+    }
+
+    /// Runs what comes before ray tracing: afterwards the [`ray_list`](Self::ray_list) can be traced. Looks at
+    /// normal, roughness and depth only.
+    ///
+    /// # Errors
+    ///
+    /// As [`denoise`](Self::denoise).
+    pub fn run_classify(&mut self, inputs: &Inputs<'_>, frame: &FrameInputs) -> Result<(), Error> {
+        inputs.check(self.core.plan().inputs(), frame.size)?;
+        // A frame that was classified and never denoised left no history.
+        let mut frame = frame.clone();
+        frame.reset |= self.pending.is_some();
+        let schedule = self.core.next_frame(&frame)?;
+        self.constants.write(bytemuck::cast_slice(&[schedule.constants]).iter().copied());
+        self.phase = schedule.phase;
+        self.run_stage(Stage::Classify, inputs, &schedule)?;
+        self.pending = Some(schedule);
+        Ok(())
+    }
+
+    /// Runs what comes after ray tracing, with the inputs of [`run_classify`](Self::run_classify).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Order`], or one of the `Input` errors.
+    pub fn run_denoise(&mut self, inputs: &Inputs<'_>) -> Result<(), Error> {
+        let schedule = self.pending.clone().ok_or(Error::Order)?;
+        inputs.check(self.core.plan().inputs(), UVec2::from_array(schedule.constants.size))?;
+        self.run_stage(Stage::Denoise, inputs, &schedule)?;
+        self.pending = None;
+        Ok(())
+    }
+
+    fn run_stage(&self, stage: Stage, inputs: &Inputs<'_>, schedule: &FrameSchedule) -> Result<(), Error> {
+        let passes = self.core.plan().passes.iter().zip(&self.executors);
+        for (pass, executor) in passes.filter(|(pass, _)| pass.stage == stage) {
+            let bindings: Vec<_> =
+                pass.bindings.iter().filter_map(|bound| self.binding(bound, inputs, schedule.phase)).collect();
+            executor.dispatch(self.workgroups(pass, schedule), &bindings)?;
+        }
+        Ok(())
+    }
+
+    fn workgroups(&self, pass: &Pass, schedule: &FrameSchedule) -> [u32; 3] {
+        match (schedule.workgroups(&pass.grid), &pass.grid) {
+            (Some(groups), _) => groups,
+            (None, Grid::Indirect { resource, offset }) => {
+                let word = |i: u64| match self.allocations.get(resource) {
+                    Some(Allocation::Buffer(buffer)) => buffer.get((offset / 4 + i) as u32),
+                    _ => 0,
+                };
+                [word(0), word(1), word(2)]
+            }
+            (None, _) => [0; 3],
+        }
+    }
+
+    fn binding<'a>(&'a self, bound: &Bound, inputs: &Inputs<'a>, phase: usize) -> Option<Binding<'a>> {
+        let Bound { group, binding, resource, copy, .. } = bound;
+        if resource == "frame" {
+            return Some(Binding::buffer(*group, *binding, &self.constants));
+        }
+        if let Some(Allocation::Buffer(buffer)) = self.allocations.get(resource) {
+            return Some(Binding::buffer(*group, *binding, buffer));
+        }
+        let texture = inputs.get(resource).or_else(|| self.intermediate_texture_in(resource, *copy, phase))?;
+        Some(Binding::texture(*group, *binding, texture))
+    }
+
+    fn intermediate_texture_in(&self, name: &str, copy: Copy, phase: usize) -> Option<&Texture> {
+        find_texture(self.core.plan(), &self.allocations, name, copy, phase)
+    }
+
+    /// The denoised image of the last frame: `rgb` radiance, `a` variance. Also next frame's history.
+    pub fn output(&self) -> &Texture {
+        self.intermediate_texture(OUTPUT, Copy::Current).expect("every plan has an output")
+    }
+
+    /// A texture of the plan as it is after the last frame.
+    pub fn intermediate_texture(&self, resource: &str, copy: Copy) -> Option<&Texture> {
+        self.intermediate_texture_in(resource, copy, self.phase)
+    }
+
+    /// A buffer of the plan as it is after the last frame.
+    pub fn intermediate_buffer(&self, resource: &str) -> Option<&Buffer> {
+        match self.allocations.get(resource)? {
+            Allocation::Buffer(buffer) => Some(buffer),
+            Allocation::Textures(_) => None,
+        }
+    }
+
+    /// The rays to trace, after [`run_classify`](Self::run_classify), as `kernels/classify.wgsl` packs them.
+    /// `None` unless the settings ask for a list.
+    pub fn ray_list(&self) -> Option<Vec<u32>> {
+        let count_word = self.core.ray_args_offset()? / 4 + 3;
+        let count = self.intermediate_buffer("args")?.get(count_word as u32);
+        let mut rays = self.intermediate_buffer("rays")?.read();
+        rays.truncate(count as usize);
+        Some(rays)
+    }
+}

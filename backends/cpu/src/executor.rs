@@ -1,0 +1,79 @@
+use naga::valid::ModuleInfo;
+use rayon::prelude::*;
+
+use crate::compile::{BindingSlot, Code, SlotKind, compile};
+use crate::machine::{Bound, Machine};
+use crate::{Buffer, CompileError, DispatchError, Texture};
+
+/// A resource for a binding of a kernel.
+#[derive(Debug, Clone, Copy)]
+pub struct Binding<'a> {
+    group: u32,
+    binding: u32,
+    bound: Bound<'a>,
+}
+
+impl<'a> Binding<'a> {
+    /// Binds a buffer.
+    pub fn buffer(group: u32, binding: u32, buffer: &'a Buffer) -> Self {
+        Self { group, binding, bound: Bound::Buffer(buffer) }
+    }
+
+    /// Binds a texture.
+    pub fn texture(group: u32, binding: u32, texture: &'a Texture) -> Self {
+        Self { group, binding, bound: Bound::Texture(texture) }
+    }
+}
+
+/// A compiled compute kernel.
+#[derive(Debug)]
+pub struct Executor {
+    code: Code,
+}
+
+impl Executor {
+    /// Compiles an entry point of a validated module without overrides.
+    ///
+    /// # Errors
+    ///
+    /// [`CompileError`] for what the executor does not know; nothing is left to fail while running.
+    pub fn new(module: &naga::Module, info: &ModuleInfo, entry_point: &str) -> Result<Self, CompileError> {
+        Ok(Self { code: compile(module, info, entry_point)? })
+    }
+
+    /// Number of instructions.
+    pub fn instruction_count(&self) -> usize {
+        self.code.ops.len()
+    }
+
+    fn bind<'a>(&self, slot: &BindingSlot, bindings: &[Binding<'a>]) -> Result<Bound<'a>, DispatchError> {
+        let BindingSlot { name, group, binding, kind } = slot;
+        let given = bindings.iter().find(|given| given.group == *group && given.binding == *binding);
+        let fail = |expected| DispatchError::Binding { name: name.clone(), group: *group, binding: *binding, expected };
+        match (given.map(|given| given.bound), kind) {
+            (Some(bound @ Bound::Buffer(_)), SlotKind::Buffer { .. }) => Ok(bound),
+            (Some(bound @ Bound::Texture(_)), SlotKind::Texture) => Ok(bound),
+            (_, SlotKind::Buffer { .. }) => Err(fail("a buffer")),
+            (_, SlotKind::Texture) => Err(fail("a texture")),
+        }
+    }
+
+    /// Runs `groups` workgroups.
+    ///
+    /// # Errors
+    ///
+    /// [`DispatchError`] for a binding that is missing or of another kind.
+    pub fn dispatch(&self, groups: [u32; 3], bindings: &[Binding<'_>]) -> Result<(), DispatchError> {
+        let bound: Result<Vec<_>, _> = self.code.bindings.iter().map(|slot| self.bind(slot, bindings)).collect();
+        let bound = bound?;
+        let count = groups.iter().map(|&count| count as usize).product::<usize>();
+        let [width, height, _] = groups.map(|count| count as usize);
+        let position =
+            |index: usize| [index % width, index / width % height, index / (width * height)].map(|i| i as u32);
+        (0..count)
+            .into_par_iter()
+            .with_min_len(8)
+            .for_each_init(|| Machine::new(&self.code, &bound, groups), |machine, index| machine.run(position(index)));
+        Ok(())
+    }
+}

@@ -1,0 +1,47 @@
+//! Runs limpid, and any other compute kernel that naga can read, on the CPU alone.
+//!
+//! [`Executor`] compiles the IR of a validated naga module once to a flat list of instructions, each of which
+//! works on all invocations of a workgroup; workgroups run in parallel.
+//!
+//! ```
+//! use limpid_cpu::{Binding, Buffer, Executor};
+//!
+//! let source = "
+//!     @group(0) @binding(0) var<storage, read_write> numbers: array<f32>;
+//!     @compute @workgroup_size(64)
+//!     fn double(@builtin(global_invocation_id) id: vec3<u32>) {
+//!         if id.x < arrayLength(&numbers) {
+//!             numbers[id.x] *= 2.0;
+//!         }
+//!     }";
+//! let module = naga::front::wgsl::parse_str(source)?;
+//! let mut validator = naga::valid::Validator::new(Default::default(), Default::default());
+//! let executor = Executor::new(&module, &validator.validate(&module)?, "double")?;
+//!
+//! let numbers = Buffer::new((0..100).map(|i| (i as f32).to_bits()));
+//! executor.dispatch([2, 1, 1], &[Binding::buffer(0, 0, &numbers)])?;
+//! assert_eq!(f32::from_bits(numbers.read()[21]), 42.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+#![forbid(unsafe_code)]
+
+mod compile;
+mod denoiser;
+mod error;
+mod eval;
+mod executor;
+mod layout;
+mod machine;
+mod math;
+mod op;
+mod registers;
+mod resource;
+
+pub use denoiser::{Denoiser, Inputs};
+pub use error::{CompileError, DispatchError, Error};
+pub use executor::{Binding, Executor};
+pub use resource::{Buffer, TexelFormat, Texture};
+
+/// Invocations that one instruction works on at a time.
+pub(crate) const LANES: usize = 64;

@@ -1,0 +1,299 @@
+//! The instructions of a compiled kernel. Each works on all invocations of a workgroup at once.
+
+/// Where an instruction finds a 32-bit value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Operand {
+    /// The same for every kernel run.
+    Const(u32),
+    /// A scalar register: the same for every invocation of the workgroup.
+    Scalar(u32),
+    /// A lane register: one value an invocation.
+    Lane(u32),
+}
+
+/// Operations on one value. Booleans are 0 or all ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Unary {
+    Copy,
+    Not,
+    NegF,
+    NegI,
+    AbsF,
+    AbsI,
+    SignF,
+    SignI,
+    Floor,
+    Ceil,
+    Round,
+    Trunc,
+    Fract,
+    Sqrt,
+    InverseSqrt,
+    Exp,
+    Exp2,
+    Log,
+    Log2,
+    Sin,
+    Cos,
+    Tan,
+    Asin,
+    Acos,
+    Atan,
+    Sinh,
+    Cosh,
+    Tanh,
+    Asinh,
+    Acosh,
+    Atanh,
+    SaturateF,
+    IntToFloat,
+    UintToFloat,
+    FloatToInt,
+    FloatToUint,
+    BoolToInt,
+    BoolToFloat,
+    IntToBool,
+    FloatToBool,
+    IsNan,
+    IsInf,
+    CountOneBits,
+    CountLeadingZeros,
+    CountTrailingZeros,
+    ReverseBits,
+    FirstLeadingBitI,
+    FirstLeadingBitU,
+    FirstTrailingBit,
+    FrexpFraction,
+    FrexpExponent,
+    QuantizeToF16,
+    /// Low half of the word, as the name says.
+    HalfToFloat,
+    HighHalfToFloat,
+    LowSnorm16,
+    HighSnorm16,
+    LowUnorm16,
+    HighUnorm16,
+    Unorm8(u8),
+    Snorm8(u8),
+    Int8(u8),
+    Uint8(u8),
+    ToSnorm16,
+    ToUnorm16,
+    ToSnorm8,
+    ToUnorm8,
+    ToHalf,
+}
+
+/// Operations on two values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Binary {
+    AddF,
+    SubF,
+    MulF,
+    DivF,
+    RemF,
+    MinF,
+    MaxF,
+    AddI,
+    SubI,
+    MulI,
+    DivI,
+    RemI,
+    MinI,
+    MaxI,
+    DivU,
+    RemU,
+    MinU,
+    MaxU,
+    And,
+    AndNot,
+    Or,
+    Xor,
+    ShiftLeft,
+    ShiftRightI,
+    ShiftRightU,
+    EqF,
+    NeF,
+    LtF,
+    LeF,
+    EqI,
+    NeI,
+    LtI,
+    LeI,
+    LtU,
+    LeU,
+    Pow,
+    Atan2,
+    Step,
+    Ldexp,
+    /// Low half of the first, low half of the second above it.
+    Pack16,
+}
+
+/// What an atomic operation does with the value in memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Atomic {
+    Add,
+    Subtract,
+    And,
+    Xor,
+    Or,
+    MinI,
+    MaxI,
+    MinU,
+    MaxU,
+    Exchange,
+}
+
+/// Memory with addresses, in words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Memory {
+    /// Shared by the workgroup.
+    Workgroup,
+    /// A bound buffer, by its place among the program's bindings.
+    Buffer(u32),
+}
+
+/// A value with a name given by the API.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum BuiltIn {
+    LocalId(u8),
+    LocalIndex,
+    GlobalId(u8),
+    WorkgroupId(u8),
+    WorkgroupCount(u8),
+}
+
+/// One instruction. `mask` is a lane register with all ones for the invocations that take part; none means all.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Op {
+    Unary {
+        op: Unary,
+        to: Operand,
+        a: Operand,
+    },
+    Binary {
+        op: Binary,
+        to: Operand,
+        a: Operand,
+        b: Operand,
+    },
+    /// `condition ? a : b`.
+    Select {
+        to: Operand,
+        condition: Operand,
+        a: Operand,
+        b: Operand,
+    },
+    Fma {
+        to: Operand,
+        a: Operand,
+        b: Operand,
+        c: Operand,
+    },
+    /// Writes a variable where the mask allows.
+    Assign {
+        to: Operand,
+        a: Operand,
+        mask: Option<u32>,
+    },
+    BuiltIn {
+        to: Operand,
+        value: BuiltIn,
+    },
+    /// One of consecutive registers.
+    ReadIndexed {
+        to: Operand,
+        base: Operand,
+        stride: u32,
+        count: u32,
+        index: Operand,
+    },
+    WriteIndexed {
+        base: Operand,
+        stride: u32,
+        count: u32,
+        index: Operand,
+        a: Operand,
+        mask: Option<u32>,
+    },
+    /// One of some constants.
+    Table {
+        to: Operand,
+        table: u32,
+        stride: u32,
+        offset: u32,
+        index: Operand,
+    },
+    Load {
+        to: Operand,
+        memory: Memory,
+        address: Operand,
+        offset: u32,
+    },
+    Store {
+        memory: Memory,
+        address: Operand,
+        offset: u32,
+        a: Operand,
+        mask: Option<u32>,
+    },
+    Atomic {
+        op: Atomic,
+        to: Option<u32>,
+        memory: Memory,
+        address: Operand,
+        offset: u32,
+        a: Operand,
+        mask: Option<u32>,
+    },
+    /// Number of elements of a runtime-sized array.
+    ArrayLength {
+        to: Operand,
+        buffer: u32,
+        offset: u32,
+        stride: u32,
+    },
+    /// The components of a texel that are wanted.
+    TextureLoad {
+        to: [Option<u32>; 4],
+        texture: u32,
+        x: Operand,
+        y: Operand,
+        level: Operand,
+    },
+    TextureStore {
+        texture: u32,
+        x: Operand,
+        y: Operand,
+        texel: [Operand; 4],
+        mask: Option<u32>,
+    },
+    TextureSize {
+        to: [Operand; 2],
+        texture: u32,
+        level: Operand,
+    },
+    TextureLevels {
+        to: Operand,
+        texture: u32,
+    },
+    Jump {
+        to: usize,
+    },
+    /// Jumps when a scalar is false.
+    JumpIfFalse {
+        condition: Operand,
+        to: usize,
+    },
+    /// Jumps when no invocation of a mask is active.
+    JumpIfNone {
+        mask: u32,
+        to: usize,
+    },
+    /// Jumps when some are.
+    JumpIfAny {
+        mask: u32,
+        to: usize,
+    },
+}

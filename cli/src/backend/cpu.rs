@@ -1,0 +1,95 @@
+//! The CPU backend: the same kernels, no driver.
+
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use glam::UVec2;
+use half::f16;
+use limpid::settings::DepthEncoding;
+use limpid::{FrameInputs, Plan, Settings};
+use limpid_cpu::{Denoiser, Inputs, TexelFormat, Texture};
+
+use super::{Backend, Denoised, ListedRay, Tracer, timed, to_half, trace_listed};
+use crate::sequence::Frame;
+
+pub(super) struct Cpu {
+    description: String,
+    denoiser: Denoiser,
+}
+
+impl Cpu {
+    pub(super) fn open(settings: &Settings, size: UVec2) -> Result<Self> {
+        // Sequences hold linear depth.
+        let mut settings = settings.clone();
+        settings.conventions.depth = DepthEncoding::Linear;
+        let denoiser = Denoiser::new(&settings, size)?;
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        Ok(Self { description: format!("the CPU ({threads} threads, no driver)"), denoiser })
+    }
+}
+
+/// A texture from scalars, texel by texel.
+fn texture(format: TexelFormat, size: UVec2, scalars: impl IntoIterator<Item = f32>) -> Texture {
+    let mut texture = Texture::new(format, size.x, size.y);
+    texture.write(scalars.into_iter().map(f32::to_bits));
+    texture
+}
+
+/// Radiance in half floats, as renderers keep it.
+fn radiance_texture(size: UVec2, radiance: &[[f32; 4]]) -> Texture {
+    let mut texture = Texture::new(TexelFormat::Rgba16Float, size.x, size.y);
+    let word = |low: f32, high: f32| u32::from(to_half(low).to_bits()) | u32::from(to_half(high).to_bits()) << 16;
+    texture.write(radiance.iter().flat_map(|&[r, g, b, a]| [word(r, g), word(b, a)]));
+    texture
+}
+
+fn output(texture: &Texture, size: UVec2) -> Vec<[f32; 3]> {
+    let words = texture.read();
+    let row = texture.size()[0] as usize * 2;
+    let half = |bits: u32| f16::from_bits(bits as u16).to_f32();
+    let rows = words.chunks_exact(row).take(size.y as usize);
+    rows.flat_map(|row| row[..size.x as usize * 2].chunks_exact(2))
+        .map(|texel| [half(texel[0]), half(texel[0] >> 16), half(texel[1])])
+        .collect()
+}
+
+impl Backend for Cpu {
+    fn device(&self) -> &str {
+        &self.description
+    }
+
+    fn plan(&self) -> &Plan {
+        self.denoiser.plan()
+    }
+
+    fn denoise(&mut self, frame: &Frame, exposure: f32, tracer: Option<Tracer<'_>>) -> Result<Denoised> {
+        let size = frame.size;
+        let mut frame_inputs = FrameInputs::new(frame.camera, size);
+        frame_inputs.reset = frame.reset;
+        frame_inputs.exposure = exposure;
+        let normal = texture(TexelFormat::Rgba32Float, size, frame.normal.iter().flat_map(|&[x, y, z]| [x, y, z, 0.0]));
+        let roughness = texture(TexelFormat::R32Float, size, frame.roughness.iter().copied());
+        let depth = texture(TexelFormat::R32Float, size, frame.depth.iter().copied());
+        let motion = texture(TexelFormat::Rg32Float, size, frame.motion.iter().flatten().copied());
+        let mut radiance = radiance_texture(size, &frame.radiance);
+        let (normal, roughness, depth, motion) = (&normal, &roughness, &depth, &motion);
+        let inputs = Inputs { radiance: &radiance, normal, roughness, depth, motion, environment: None };
+
+        let (mut time, mut cpu_time) = (Duration::ZERO, Duration::ZERO);
+        timed(&mut time, &mut cpu_time, || self.denoiser.run_classify(&inputs, &frame_inputs))?;
+        let mut rays = frame.depth.iter().filter(|depth| **depth > 0.0).count() as u64;
+        let mut traced = None;
+        if let Some(tracer) = tracer {
+            let words = self.denoiser.ray_list().context("the settings ask for no ray list")?;
+            let listed: Vec<_> = words.into_iter().map(ListedRay::unpack).collect();
+            rays = listed.len() as u64;
+            let values = trace_listed(&listed, size, tracer);
+            radiance = radiance_texture(size, &values);
+            traced = Some(values);
+        }
+        let inputs = Inputs { radiance: &radiance, normal, roughness, depth, motion, environment: None };
+        timed(&mut time, &mut cpu_time, || self.denoiser.run_denoise(&inputs))?;
+        let radiance = output(self.denoiser.output(), size);
+        Ok(Denoised { radiance, time, cpu_time, pass_times: Vec::new(), rays, traced })
+    }
+}
