@@ -54,6 +54,12 @@ pub struct Linked {
 }
 
 impl Linked {
+    /// File and line of a byte of `text`, as `kernels/name.wgsl:12`.
+    pub fn place(&self, offset: usize) -> Option<String> {
+        let line = self.text.get(..offset)?.matches('\n').count();
+        self.origins.get(line).map(|(file, line)| format!("{file}:{line}"))
+    }
+
     /// Replaces line numbers of a report on the linked text by those of the files.
     fn locate(&self, message: &str, line: Option<u32>) -> String {
         match line.and_then(|line| self.origins.get(line as usize - 1)) {
@@ -149,6 +155,8 @@ pub struct Kernel {
     pub bindings: Vec<Binding>,
     /// Invocations per workgroup.
     pub workgroup_size: [u32; 3],
+    /// The source that the spans in `module` are about.
+    pub linked: Linked,
 }
 
 fn validator() -> Validator {
@@ -192,7 +200,7 @@ impl Kernel {
         let entry_point =
             module.entry_points.first().ok_or_else(|| fail("reflect", format!("there is no entry point `{name}`")))?;
         let workgroup_size = entry_point.workgroup_size;
-        Ok(Self { name, module, info, bindings, workgroup_size })
+        Ok(Self { name, module, info, bindings, workgroup_size, linked: linked.clone() })
     }
 }
 

@@ -5,7 +5,7 @@ use limpid::plan::{Bound, Grid, OUTPUT, Pass, Stage};
 use limpid::resource::{Copy, Format, Kind};
 use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
-use crate::{Binding, Buffer, Error, Executor, TexelFormat, Texture};
+use crate::{Binding, Buffer, Error, Executor, Fault, TexelFormat, Texture};
 
 /// The caller's images of one frame, of any format. Encodings are set in
 /// [`Settings::conventions`](limpid::settings::Conventions).
@@ -65,6 +65,8 @@ pub struct Denoiser {
     /// The frame that was classified and not denoised yet.
     pending: Option<FrameSchedule>,
     phase: usize,
+    /// Faults by kernel, when kernels are watched.
+    faults: Option<Vec<(&'static str, Fault)>>,
 }
 
 fn texel_format(format: Format) -> TexelFormat {
@@ -118,7 +120,7 @@ impl Denoiser {
         let executors = core.kernels().iter().map(compile).collect::<Result<_, _>>()?;
         let allocations = allocate(core.plan());
         let constants = Buffer::zeroed(size_of::<FrameConstants>() / 4);
-        Ok(Self { core, executors, allocations, constants, pending: None, phase: 0 })
+        Ok(Self { core, executors, allocations, constants, pending: None, phase: 0, faults: None })
     }
 
     /// What is allocated and dispatched.
@@ -168,14 +170,41 @@ impl Denoiser {
         Ok(())
     }
 
-    fn run_stage(&self, stage: Stage, inputs: &Inputs<'_>, schedule: &FrameSchedule) -> Result<(), Error> {
-        let passes = self.core.plan().passes.iter().zip(&self.executors);
-        for (pass, executor) in passes.filter(|(pass, _)| pass.stage == stage) {
+    fn run_stage(&mut self, stage: Stage, inputs: &Inputs<'_>, schedule: &FrameSchedule) -> Result<(), Error> {
+        let passes = self.core.plan().passes.iter().zip(&self.executors).zip(self.core.kernels());
+        let mut found = Vec::new();
+        for ((pass, executor), kernel) in passes.filter(|((pass, _), _)| pass.stage == stage) {
             let bindings: Vec<_> =
                 pass.bindings.iter().filter_map(|bound| self.binding(bound, inputs, schedule.phase)).collect();
-            executor.dispatch(self.workgroups(pass, schedule), &bindings)?;
+            let groups = self.workgroups(pass, schedule);
+            if self.faults.is_some() {
+                found.extend(
+                    executor.dispatch_checked(groups, &bindings)?.into_iter().map(|fault| (kernel.name, fault)),
+                );
+            } else {
+                executor.dispatch(groups, &bindings)?;
+            }
+        }
+        if let Some(faults) = &mut self.faults {
+            faults.extend(found);
         }
         Ok(())
+    }
+
+    /// From now on runs kernels one workgroup after another and watches them; see
+    /// [`Executor::dispatch_checked`].
+    pub fn watch(&mut self) {
+        self.faults = Some(Vec::new());
+    }
+
+    /// What kernels did that they must not, since [`watch`](Self::watch): kernel, place in its source as
+    /// `file:line`, and fault.
+    pub fn faults(&self) -> impl Iterator<Item = (&'static str, String, &Fault)> {
+        self.faults.iter().flatten().map(|(name, fault)| {
+            let kernel = self.core.kernels().iter().find(|kernel| kernel.name == *name);
+            let place = kernel.zip(fault.offset).and_then(|(kernel, offset)| kernel.linked.place(offset));
+            (*name, place.unwrap_or_default(), fault)
+        })
     }
 
     fn workgroups(&self, pass: &Pass, schedule: &FrameSchedule) -> [u32; 3] {

@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use crate::compile::{BindingSlot, Code, SlotKind, compile};
 use crate::machine::{Bound, Machine};
-use crate::{Buffer, CompileError, DispatchError, Texture};
+use crate::{Buffer, CompileError, DispatchError, Fault, Texture};
 
 /// A resource for a binding of a kernel.
 #[derive(Debug, Clone, Copy)]
@@ -64,16 +64,39 @@ impl Executor {
     ///
     /// [`DispatchError`] for a binding that is missing or of another kind.
     pub fn dispatch(&self, groups: [u32; 3], bindings: &[Binding<'_>]) -> Result<(), DispatchError> {
-        let bound: Result<Vec<_>, _> = self.code.bindings.iter().map(|slot| self.bind(slot, bindings)).collect();
-        let bound = bound?;
-        let count = groups.iter().map(|&count| count as usize).product::<usize>();
-        let [width, height, _] = groups.map(|count| count as usize);
-        let position =
-            |index: usize| [index % width, index / width % height, index / (width * height)].map(|i| i as u32);
-        (0..count)
-            .into_par_iter()
-            .with_min_len(8)
-            .for_each_init(|| Machine::new(&self.code, &bound, groups), |machine, index| machine.run(position(index)));
+        let bound = self.bind_all(bindings)?;
+        (0..count(groups)).into_par_iter().with_min_len(8).for_each_init(
+            || Machine::new(&self.code, &bound, groups),
+            |machine, index| machine.run(position(groups, index)),
+        );
         Ok(())
     }
+
+    /// Runs `groups` workgroups one after another and watches what they do: uninitialised or racy use of
+    /// workgroup memory, accesses out of bounds, barriers that not all reach. Results are those of
+    /// [`dispatch`](Self::dispatch). Races between workgroups are not seen.
+    ///
+    /// # Errors
+    ///
+    /// As [`dispatch`](Self::dispatch).
+    pub fn dispatch_checked(&self, groups: [u32; 3], bindings: &[Binding<'_>]) -> Result<Vec<Fault>, DispatchError> {
+        let bound = self.bind_all(bindings)?;
+        let mut machine = Machine::checked(&self.code, &bound, groups);
+        (0..count(groups)).for_each(|index| machine.run(position(groups, index)));
+        Ok(machine.into_faults())
+    }
+
+    fn bind_all<'a>(&self, bindings: &[Binding<'a>]) -> Result<Vec<Bound<'a>>, DispatchError> {
+        self.code.bindings.iter().map(|slot| self.bind(slot, bindings)).collect()
+    }
+}
+
+fn count(groups: [u32; 3]) -> usize {
+    groups.iter().map(|&count| count as usize).product()
+}
+
+/// Position of a workgroup by its number, `x` fastest.
+fn position(groups: [u32; 3], index: usize) -> [u32; 3] {
+    let [width, height, _] = groups.map(|count| count as usize);
+    [index % width, index / width % height, index / (width * height)].map(|i| i as u32)
 }

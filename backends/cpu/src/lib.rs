@@ -26,6 +26,7 @@
 
 #![forbid(unsafe_code)]
 
+mod check;
 mod compile;
 mod denoiser;
 mod error;
@@ -38,6 +39,7 @@ mod op;
 mod registers;
 mod resource;
 
+pub use check::{Fault, FaultKind};
 pub use denoiser::{Denoiser, Inputs};
 pub use error::{CompileError, DispatchError, Error};
 pub use executor::{Binding, Executor};

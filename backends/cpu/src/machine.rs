@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::LANES;
+use crate::check::{Checker, Fault, FaultKind, Use};
 use crate::compile::Code;
 use crate::eval::{f, with_binary, with_unary};
 use crate::op::{Atomic, BuiltIn, Memory, Op, Operand};
@@ -28,6 +29,9 @@ pub(crate) struct Machine<'a> {
     workgroup: Vec<u32>,
     group: [u32; 3],
     group_count: [u32; 3],
+    /// Instruction that is running.
+    current: usize,
+    checker: Option<Checker>,
 }
 
 impl<'a> Machine<'a> {
@@ -43,12 +47,78 @@ impl<'a> Machine<'a> {
             workgroup: vec![0; code.workgroup_words as usize],
             group: [0; 3],
             group_count,
+            current: 0,
+            checker: None,
         }
+    }
+
+    /// A machine that watches what kernels do.
+    pub(crate) fn checked(code: &'a Code, bound: &'a [Bound<'a>], group_count: [u32; 3]) -> Self {
+        Self { checker: Some(Checker::default()), ..Self::new(code, bound, group_count) }
+    }
+
+    pub(crate) fn into_faults(self) -> Vec<Fault> {
+        self.checker.map(Checker::into_faults).unwrap_or_default()
     }
 
     pub(crate) fn run(&mut self, group: [u32; 3]) {
         self.group = group;
+        self.workgroup.fill(0);
+        if let Some(checker) = &mut self.checker {
+            checker.begin(group, self.workgroup.len());
+        }
         run(self);
+    }
+
+    /// Calls `check` for every invocation that is active, and notes what it finds.
+    fn check(&mut self, mask: Option<u32>, check: impl Fn(&mut Checker, &Self, usize, usize) -> Option<FaultKind>) {
+        let Some(mut checker) = self.checker.take() else { return };
+        let invocations = self.code.workgroup_size.iter().product::<u32>() as usize;
+        for index in 0..invocations {
+            let (row, lane) = (index / LANES, index % LANES);
+            if self.mask_row(mask, row)[lane] == 0 {
+                continue;
+            }
+            if let Some(kind) = check(&mut checker, self, row, lane) {
+                checker.fault(self.current, self.code.spans[self.current], kind, index as u32);
+            }
+        }
+        self.checker = Some(checker);
+    }
+
+    #[cold]
+    fn check_memory(&mut self, memory: Memory, address: Operand, offset: u32, usage: Use, mask: Option<u32>) {
+        self.check(mask, |checker, machine, row, lane| {
+            let address = machine.row(address, row)[lane].wrapping_add(offset) as usize;
+            match memory {
+                Memory::Workgroup => checker.workgroup_use(address, usage, (row * LANES + lane) as u32),
+                Memory::Buffer(slot) => {
+                    let inside = machine.buffer(slot).is_some_and(|buffer| address < buffer.words.len());
+                    let kind =
+                        if usage == Use::Read { FaultKind::ReadOutOfBounds } else { FaultKind::WriteOutOfBounds };
+                    (!inside).then_some(kind)
+                }
+            }
+        });
+    }
+
+    #[cold]
+    fn check_texture(&mut self, texture: u32, at: [Operand; 3], mask: Option<u32>, kind: FaultKind) {
+        let Some(texture) = self.texture(texture) else { return };
+        self.check(mask, |_, machine, row, lane| {
+            let [x, y, level] = at.map(|operand| machine.row(operand, row)[lane]);
+            let level = texture.levels.get(level as usize);
+            level.is_none_or(|level| x >= level.width || y >= level.height).then_some(kind)
+        });
+    }
+
+    #[cold]
+    fn check_barrier(&mut self, mask: Option<u32>) {
+        let masks: Vec<Lanes> = (0..self.rows).map(|row| self.mask_row(mask, row)).collect();
+        self.check(None, |_, _, row, lane| (masks[row][lane] == 0).then_some(FaultKind::DivergentBarrier));
+        if let Some(checker) = &mut self.checker {
+            checker.barrier();
+        }
     }
 
     #[inline(always)]
@@ -520,6 +590,7 @@ fn run<'a>(machine: &mut Machine<'a>) {
     let code = machine.code;
     let mut counter = 0;
     while let Some(op) = code.ops.get(counter) {
+        machine.current = counter;
         counter += 1;
         match *op {
             Op::Unary { op, to, a } => {
@@ -560,17 +631,48 @@ fn run<'a>(machine: &mut Machine<'a>) {
             Op::ReadIndexed { to, base, stride, count, index } => machine.read_indexed(to, base, stride, count, index),
             Op::WriteIndexed { .. } => machine.write_indexed(op),
             Op::Table { to, table, stride, offset, index } => machine.table(to, table, stride, offset, index),
-            Op::Load { to, memory, address, offset } => machine.load(to, memory, address, offset),
-            Op::Store { memory, address, offset, a, mask } => machine.store(memory, address, offset, a, mask),
+            Op::Load { to, memory, address, offset, mask } => {
+                if machine.checker.is_some() {
+                    machine.check_memory(memory, address, offset, Use::Read, mask);
+                }
+                machine.load(to, memory, address, offset);
+            }
+            Op::Store { memory, address, offset, a, mask } => {
+                if machine.checker.is_some() {
+                    machine.check_memory(memory, address, offset, Use::Write, mask);
+                }
+                machine.store(memory, address, offset, a, mask);
+            }
             Op::Atomic { op, to, memory, address, offset, a, mask } => {
+                if machine.checker.is_some() {
+                    let stores = op == Atomic::Exchange && to.is_none();
+                    let usage = if stores { Use::AtomicStore } else { Use::Atomic };
+                    machine.check_memory(memory, address, offset, usage, mask);
+                }
                 machine.atomic(op, to, memory, address, offset, a, mask);
             }
             Op::ArrayLength { to, buffer, offset, stride } => {
                 let words = machine.buffer(buffer).map_or(0, |buffer| buffer.words.len() as u32);
                 machine.set_scalar(to, words.saturating_sub(offset) / stride);
             }
-            Op::TextureLoad { to, texture, x, y, level } => machine.texture_load(to, texture, x, y, level),
-            Op::TextureStore { texture, x, y, texel, mask } => machine.texture_store(texture, x, y, texel, mask),
+            Op::TextureLoad { to, texture, x, y, level, mask } => {
+                if machine.checker.is_some() {
+                    machine.check_texture(texture, [x, y, level], mask, FaultKind::ReadOutOfBounds);
+                }
+                machine.texture_load(to, texture, x, y, level);
+            }
+            Op::TextureStore { texture, x, y, texel, mask } => {
+                if machine.checker.is_some() {
+                    let at = [x, y, Operand::Const(0)];
+                    machine.check_texture(texture, at, mask, FaultKind::WriteOutOfBounds);
+                }
+                machine.texture_store(texture, x, y, texel, mask);
+            }
+            Op::Barrier { mask } => {
+                if machine.checker.is_some() {
+                    machine.check_barrier(mask);
+                }
+            }
             Op::TextureSize { to, texture, level } => {
                 let levels = machine.texture(texture).map_or(&[][..], |texture| &texture.levels);
                 let size = |axis: usize| {

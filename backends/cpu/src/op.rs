@@ -230,6 +230,8 @@ pub(crate) enum Op {
         memory: Memory,
         address: Operand,
         offset: u32,
+        /// Only for checks.
+        mask: Option<u32>,
     },
     Store {
         memory: Memory,
@@ -261,6 +263,8 @@ pub(crate) enum Op {
         x: Operand,
         y: Operand,
         level: Operand,
+        /// Only for checks.
+        mask: Option<u32>,
     },
     TextureStore {
         texture: u32,
@@ -277,6 +281,10 @@ pub(crate) enum Op {
     TextureLevels {
         to: Operand,
         texture: u32,
+    },
+    /// All invocations are always at the same instruction: only checks look at it.
+    Barrier {
+        mask: Option<u32>,
     },
     Jump {
         to: usize,

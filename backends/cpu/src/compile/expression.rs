@@ -209,6 +209,7 @@ impl<'a> Compiler<'a> {
         range: &naga::Range<Expression>,
     ) -> Result<()> {
         let expression = &frame.function.expressions[handle];
+        self.span = frame.function.expressions.get_span(handle);
         let is_pointer =
             matches!(self.inner(frame, handle), TypeInner::Pointer { .. } | TypeInner::ValuePointer { .. });
         if is_pointer {
@@ -295,7 +296,7 @@ impl<'a> Compiler<'a> {
                 let wanted = frame.wanted_components.get(&handle).copied().unwrap_or([false; 4]);
                 let to = wanted.map(|wanted| wanted.then(|| self.registers.allocate()));
                 let y = at.get(1).copied().unwrap_or(Operand::Const(0));
-                self.emit(Op::TextureLoad { to, texture, x: at[0], y, level });
+                self.emit(Op::TextureLoad { to, texture, x: at[0], y, level, mask: self.mask });
                 let count = self.count(&self.inner(frame, handle))? as usize;
                 Ok(to[..count].iter().map(|to| to.map_or(Operand::Const(0), Operand::Lane)).collect())
             }

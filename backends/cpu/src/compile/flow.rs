@@ -197,7 +197,8 @@ impl<'a> Compiler<'a> {
     pub(super) fn block(&mut self, frame: &mut Inlined<'a>, block: &'a Block) -> Result<()> {
         let mut defined = Vec::new();
         let mut leaves = Vec::new();
-        for statement in block {
+        for (statement, span) in block.span_iter() {
+            self.span = *span;
             self.statement(frame, statement, &mut defined)?;
             // Once every invocation has left, the rest of the block has nothing to do.
             let may_leave = match statement {
@@ -240,8 +241,11 @@ impl<'a> Compiler<'a> {
             Statement::Break => self.leave_loop(frame, true),
             Statement::Continue => self.leave_loop(frame, false),
             Statement::Return { value } => self.return_statement(frame, *value),
-            // All invocations are always at the same instruction.
-            Statement::ControlBarrier(_) | Statement::MemoryBarrier(_) => Ok(()),
+            Statement::ControlBarrier(_) => {
+                self.emit(Op::Barrier { mask: self.mask });
+                Ok(())
+            }
+            Statement::MemoryBarrier(_) => Ok(()),
             Statement::Store { pointer, value } => {
                 let place = self.place(frame, *pointer)?;
                 let operands = self.data(frame, *value)?;
@@ -456,9 +460,10 @@ impl<'a> Compiler<'a> {
         for handle in defined {
             self.forget(frame, handle);
         }
-        match (divergent, self.mask) {
-            (true, Some(mask)) => self.emit(Op::JumpIfAny { mask, to: start }),
-            _ => self.emit(Op::Jump { to: start }),
+        // Also a loop that all leave together ends when all have returned from inside it.
+        match self.mask {
+            Some(mask) => self.emit(Op::JumpIfAny { mask, to: start }),
+            None => self.emit(Op::Jump { to: start }),
         }
         self.loop_depth -= 1;
         self.exit(outer);

@@ -112,6 +112,27 @@ impl<'a> Compiler<'a> {
         sum
     }
 
+    /// By expansion along the first row.
+    fn determinant(&mut self, columns: &[Vec<Operand>]) -> Operand {
+        if let [column] = columns {
+            self.retain(&[column[0]]);
+            return column[0];
+        }
+        let mut sum: Option<Operand> = None;
+        for (index, column) in columns.iter().enumerate() {
+            let others = columns.iter().enumerate().filter(|(other, _)| *other != index);
+            let minor: Vec<_> = others.map(|(_, other)| other[1..].to_vec()).collect();
+            let factor = self.determinant(&minor);
+            let term = self.binary(Binary::MulF, column[0], factor);
+            self.release(&[factor]);
+            sum = Some(match sum {
+                None => term,
+                Some(sum) => self.fold(if index % 2 == 0 { Binary::AddF } else { Binary::SubF }, sum, term),
+            });
+        }
+        sum.unwrap_or(float(0.0))
+    }
+
     fn length(&mut self, v: &[Operand]) -> Operand {
         if let [scalar] = v {
             return self.unary(Unary::AbsF, *scalar);
@@ -253,6 +274,35 @@ impl<'a> Compiler<'a> {
                 self.release(&along);
                 self.release(&[twice]);
                 reflected
+            }
+            M::Refract => {
+                // k = 1 - eta^2 (1 - cosine^2); eta e - (eta cosine + sqrt(k)) n, or 0 where k < 0
+                let eta = c[0];
+                let cosine = self.dot(b, a);
+                let negated = self.unary(Unary::NegF, cosine);
+                let sine = self.multiply_add(negated, cosine, float(1.0));
+                let squared = self.binary(Binary::MulF, eta, eta);
+                let reduced = self.fold(Binary::MulF, squared, sine);
+                let k = self.binary(Binary::SubF, float(1.0), reduced);
+                let root = self.unary(Unary::Sqrt, k);
+                let along = self.multiply_add(eta, cosine, root);
+                let total = self.binary(Binary::LtF, k, float(0.0));
+                let bend = |compiler: &mut Self, (&e, &n): (&Operand, &Operand)| {
+                    let scaled = compiler.binary(Binary::MulF, eta, e);
+                    let pushed = compiler.binary(Binary::MulF, along, n);
+                    let bent = compiler.fold(Binary::SubF, scaled, pushed);
+                    let refracted = compiler.select(total, float(0.0), bent);
+                    compiler.release(&[bent]);
+                    refracted
+                };
+                let all = a.iter().zip(b).map(|pair| bend(self, pair)).collect();
+                self.release(&[cosine, negated, reduced, k, root, along, total]);
+                Ok(all)
+            }
+            M::Determinant => {
+                let TypeInner::Matrix { rows, .. } = inner else { return unsupported("determinant of no matrix") };
+                let columns: Vec<Vec<Operand>> = a.chunks_exact(*rows as usize).map(<[_]>::to_vec).collect();
+                Ok(vec![self.determinant(&columns)])
             }
             M::FaceForward => {
                 // dot(incident, reference) < 0 ? n : -n

@@ -95,6 +95,12 @@ impl<'a> Compiler<'a> {
         match place.root {
             Root::Memory(memory) => {
                 let address = self.address(place);
+                if let TypeInner::Atomic(_) = place.inner {
+                    // atomicLoad
+                    let value = self.atomic_op(Atomic::Or, memory, address, place.offset, Operand::Const(0), true);
+                    self.release(&[address]);
+                    return Ok(value.into_iter().collect());
+                }
                 // Only constant buffers hold the same for all: others change while the kernel runs.
                 let uniform = self.is_constant(memory);
                 let values = offsets
@@ -102,7 +108,7 @@ impl<'a> Compiler<'a> {
                     .map(|offset| {
                         let to =
                             if uniform { self.result(&[address]) } else { Operand::Lane(self.registers.allocate()) };
-                        self.emit(Op::Load { to, memory, address, offset: place.offset + offset });
+                        self.emit(Op::Load { to, memory, address, offset: place.offset + offset, mask: self.mask });
                         to
                     })
                     .collect();
@@ -134,6 +140,12 @@ impl<'a> Compiler<'a> {
         match place.root {
             Root::Memory(memory) => {
                 let address = self.address(place);
+                if let (TypeInner::Atomic(_), [a]) = (&place.inner, operands) {
+                    // atomicStore
+                    self.atomic_op(Atomic::Exchange, memory, address, place.offset, *a, false);
+                    self.release(&[address]);
+                    return Ok(());
+                }
                 let offsets = self.offsets(&place.inner);
                 for (offset, &a) in offsets.iter().zip(operands) {
                     self.emit(Op::Store { memory, address, offset: place.offset + offset, a, mask: self.mask });
@@ -200,11 +212,25 @@ impl<'a> Compiler<'a> {
         };
         let a = self.data(frame, value)?[0];
         let address = self.address(&place);
-        let to = wanted.then(|| self.registers.allocate());
-        self.emit(Op::Atomic { op, to, memory, address, offset: place.offset, a, mask: self.mask });
+        let old = self.atomic_op(op, memory, address, place.offset, a, wanted);
         self.release(&[address]);
         self.used(frame, value);
-        Ok(to.map(Operand::Lane))
+        Ok(old)
+    }
+
+    /// The value before, if it is wanted.
+    fn atomic_op(
+        &mut self,
+        op: Atomic,
+        memory: Memory,
+        address: Operand,
+        offset: u32,
+        a: Operand,
+        wanted: bool,
+    ) -> Option<Operand> {
+        let to = wanted.then(|| self.registers.allocate());
+        self.emit(Op::Atomic { op, to, memory, address, offset, a, mask: self.mask });
+        to.map(Operand::Lane)
     }
 
     pub(super) fn array_length(

@@ -39,6 +39,8 @@ pub(crate) enum SlotKind {
 #[derive(Debug)]
 pub(crate) struct Code {
     pub(crate) ops: Vec<Op>,
+    /// Where in the source each instruction comes from.
+    pub(crate) spans: Vec<naga::Span>,
     pub(crate) lane_registers: u32,
     pub(crate) scalar_registers: u32,
     pub(crate) tables: Vec<Vec<u32>>,
@@ -124,6 +126,9 @@ struct Compiler<'a> {
     module: &'a Module,
     info: &'a ModuleInfo,
     ops: Vec<Op>,
+    spans: Vec<naga::Span>,
+    /// Where in the source the compiler is.
+    span: naga::Span,
     registers: Registers,
     scalars: u32,
     tables: Vec<Vec<u32>>,
@@ -166,6 +171,7 @@ pub(crate) fn compile(module: &Module, info: &ModuleInfo, entry_point: &str) -> 
         if compiler.facts == facts {
             return Ok(Code {
                 ops: compiler.ops,
+                spans: compiler.spans,
                 lane_registers: compiler.registers.count(),
                 scalar_registers: compiler.scalars,
                 tables: compiler.tables,
@@ -184,6 +190,8 @@ impl<'a> Compiler<'a> {
             module,
             info,
             ops: Vec::new(),
+            spans: Vec::new(),
+            span: naga::Span::UNDEFINED,
             registers: Registers::default(),
             scalars: 0,
             tables: Vec::new(),
@@ -262,6 +270,7 @@ impl<'a> Compiler<'a> {
 
     fn emit(&mut self, op: Op) {
         self.ops.push(op);
+        self.spans.push(self.span);
     }
 
     fn scalar(&mut self) -> Operand {
