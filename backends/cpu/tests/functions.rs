@@ -76,7 +76,8 @@ fn pointer_arguments() {
         } else {
             b += 3;
         }
-        let (q, r) = if u == 0 { (0, 78) } else { ((a + 20) / u + 1, (a + 20) % u) };
+        let q = (a + 20).checked_div(u).map_or(0, |quotient| quotient + 1);
+        let r = (a + 20).checked_rem(u).unwrap_or(78);
         ((a * 31 + b) * 31 + q) * 31 + r
     });
 }
@@ -263,7 +264,7 @@ fn a_function_without_result_returns_early_in_loops() {
             }
             loop {
                 at += step;
-                if at % 2 == 0 {
+                if at.is_multiple_of(2) {
                     break;
                 }
                 if at > 11 {

@@ -260,15 +260,13 @@ fn conversions_from_floats_saturate_and_take_nan_for_zero() {
     check_pairs("f32", "u32", "u32(a)", &saturated, |a, _| exact(a, highest_unsigned) as u32);
     // Above, the highest integer and the highest one that is a float are both right.
     for [a, _] in pairs.into_iter().filter(|[a, _]| f32::from_bits(*a) > highest_signed) {
-        let source = format!(
-            "@group(0) @binding(0) var<storage, read_write> out: array<u32>;
-            @compute @workgroup_size(1) fn main() {{
+        let source = "@group(0) @binding(0) var<storage, read_write> out: array<u32>;
+            @compute @workgroup_size(1) fn main() {
                 let a = bitcast<f32>(out[2]);
                 out[0] = bitcast<u32>(i32(a));
                 out[1] = u32(a);
-            }}"
-        );
-        let out = run_buffers(&source, [1, 1, 1], &[vec![0, 0, a]]).remove(0);
+            }";
+        let out = run_buffers(source, [1, 1, 1], &[vec![0, 0, a]]).remove(0);
         assert!([0x7fff_ffff, 0x7fff_ff80].contains(&out[0]), "i32({}) = {}", f32::from_bits(a), out[0]);
         let unsigned = f32::from_bits(a) as u32;
         assert!([unsigned, unsigned.min(0xffff_ff00)].contains(&out[1]), "u32({}) = {}", f32::from_bits(a), out[1]);

@@ -26,7 +26,7 @@ fn check(bytes: &[u8], floats: Floats) -> Result<(), TestCaseError> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: ProptestConfig::default().cases.max(400), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn programs_compute_what_an_interpreter_does(bytes in proptest::collection::vec(any::<u8>(), 20..500)) {

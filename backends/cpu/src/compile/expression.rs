@@ -407,11 +407,12 @@ impl<'a> Compiler<'a> {
             let expression = &frame.function.expressions[other];
             let passes = matches!(
                 expression,
-                Expression::Compose { .. }
+                // A pointer keeps its index.
+                Expression::Access { .. }
+                    | Expression::Compose { .. }
                     | Expression::Splat { .. }
                     | Expression::Swizzle { .. }
                     | Expression::AccessIndex { .. }
-                    | Expression::As { convert: None, .. }
                     | Expression::As { .. }
                     | Expression::Select { .. }
                     | Expression::Relational { .. }

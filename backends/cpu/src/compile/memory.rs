@@ -82,12 +82,21 @@ impl<'a> Compiler<'a> {
         address
     }
 
-    /// The only index into a variable.
-    fn variable_index(&self, place: &Place) -> Result<(Operand, u32, u32)> {
-        match place.dynamic[..] {
-            [(index, stride, Some(count))] => Ok((index, stride, count)),
-            _ => unsupported("more than one dynamic index into a variable of a function"),
+    /// Index into the registers of a variable, distance between elements, and number of elements. The index has a
+    /// reference of its own.
+    fn variable_index(&mut self, place: &Place, variable: usize) -> (Operand, u32, u32) {
+        if let [(index, stride, Some(count))] = place.dynamic[..] {
+            self.retain(&[index]);
+            return (index, stride, count);
         }
+        let mut sum = Operand::Const(0);
+        for &(index, stride, count) in &place.dynamic {
+            let last = Operand::Const(count.map_or(u32::MAX, |count| count - 1));
+            let clamped = self.binary(Binary::MinU, index, last);
+            let scaled = self.fold(Binary::MulI, clamped, Operand::Const(stride));
+            sum = self.fold(Binary::AddI, sum, scaled);
+        }
+        (sum, 1, self.variables[variable].count - place.offset)
     }
 
     pub(super) fn load(&mut self, place: &Place) -> Result<Vec<Operand>> {
@@ -117,14 +126,16 @@ impl<'a> Compiler<'a> {
             }
             Root::Variable(variable) => {
                 let count = self.count(&place.inner)?;
-                let (index, stride, elements) = self.variable_index(place)?;
+                let (index, stride, elements) = self.variable_index(place, variable);
                 let read = |compiler: &mut Self, scalar| {
                     let base = compiler.variable_operand(variable, place.offset + scalar);
                     let to = compiler.result(&[base, index]);
                     compiler.emit(Op::ReadIndexed { to, base, stride, count: elements, index });
                     to
                 };
-                Ok((0..count).map(|scalar| read(self, scalar)).collect())
+                let values = (0..count).map(|scalar| read(self, scalar)).collect();
+                self.release(&[index]);
+                Ok(values)
             }
         }
     }
@@ -158,12 +169,13 @@ impl<'a> Compiler<'a> {
                 }
             }
             Root::Variable(variable) => {
-                let (index, stride, count) = self.variable_index(place)?;
+                let (index, stride, count) = self.variable_index(place, variable);
                 let lanes = |operand: &Operand| matches!(operand, Operand::Lane(_));
                 let declared = &self.variables[variable];
                 let must_vary = self.depth > declared.depth || operands.iter().any(lanes) || lanes(&index);
                 if must_vary && !declared.varying {
                     self.mark_varying(variable);
+                    self.release(&[index]);
                     return Ok(());
                 }
                 let mask = if self.variables[variable].varying { self.mask } else { None };
@@ -171,6 +183,7 @@ impl<'a> Compiler<'a> {
                     let base = self.variable_operand(variable, place.offset + scalar as u32);
                     self.emit(Op::WriteIndexed { base, stride, count, index, a, mask });
                 }
+                self.release(&[index]);
             }
         }
         Ok(())

@@ -78,6 +78,11 @@ impl State<'_> {
                 let (index, value) = (self.expr(index) % 4, self.expr(value));
                 self.list[index as usize] = value;
             }
+            Stmt::Through(index, variable, set, value) => {
+                let index = (self.expr(index) % 4) as usize;
+                self.variables.u[*variable] = self.expr(set);
+                self.list[index] = self.expr(value).wrapping_add(self.list[index]);
+            }
             Stmt::If(condition, accept, reject) => {
                 return if self.condition(condition) { self.block(accept) } else { self.block(reject) };
             }

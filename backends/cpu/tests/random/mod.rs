@@ -4,6 +4,8 @@
 //! A program is two functions, `test` and `helper`, over three variables of each type, an array, and a struct as
 //! result. All loops are bounded. Literals are `let` values, for WGSL rejects constant expressions that overflow.
 
+#![allow(dead_code, reason = "each test file uses a part of it")]
+
 pub(crate) mod interpret;
 pub(crate) mod print;
 
@@ -84,6 +86,8 @@ pub(crate) enum Condition {
 pub(crate) enum Stmt {
     Assign(Type, usize, Expr),
     SetElement(Expr, Expr),
+    /// Takes a pointer to an element, sets an unsigned variable, and then the element through the pointer.
+    Through(Expr, usize, Expr, Expr),
     If(Condition, Vec<Stmt>, Vec<Stmt>),
     /// `for`: at most as many rounds as the expression says, at most 5.
     For(Expr, Vec<Stmt>),
@@ -152,7 +156,7 @@ impl<'a> Generator<'a> {
     }
 
     fn statement(&mut self, depth: usize) -> Stmt {
-        let kind = self.choose(if depth == 0 { 9 } else { 19 });
+        let kind = self.choose(if depth == 0 { 10 } else { 20 });
         match kind {
             0..4 => {
                 let ty = self.ty();
@@ -163,17 +167,21 @@ impl<'a> Generator<'a> {
             6 if self.loops > 0 => Stmt::Continue,
             7 => Stmt::Return,
             8 if !self.in_helper => Stmt::Call(self.expr(Type::U, 2), self.choose(3)),
-            9..13 => {
+            9 => {
+                let (index, variable) = (self.expr(Type::U, 2), self.choose(3));
+                Stmt::Through(index, variable, self.expr(Type::U, 2), self.expr(Type::U, 2))
+            }
+            10..14 => {
                 let condition = self.condition(2);
                 let accept = self.block(depth - 1);
                 let reject = if self.choose(2) == 0 { Vec::new() } else { self.block(depth - 1) };
                 Stmt::If(condition, accept, reject)
             }
-            13 | 14 => {
+            14 | 15 => {
                 let rounds = self.expr(Type::U, 1);
                 Stmt::For(rounds, self.loop_body(depth))
             }
-            15 => {
+            16 => {
                 let body = self.loop_body(depth);
                 self.loops += 1;
                 let (can_break, condition) = (std::mem::replace(&mut self.can_break, false), self.condition(1));
@@ -183,7 +191,7 @@ impl<'a> Generator<'a> {
                 self.can_break = can_break;
                 Stmt::Loop(body, continuing, condition)
             }
-            16 | 17 => {
+            17 | 18 => {
                 let selector = self.expr(Type::U, 2);
                 let can_break = std::mem::replace(&mut self.can_break, true);
                 let mut values = (0..5u32).filter(|_| self.choose(4) != 0).collect::<Vec<_>>().into_iter().peekable();
@@ -196,7 +204,7 @@ impl<'a> Generator<'a> {
                 self.can_break = can_break;
                 Stmt::Switch(selector, cases, default, self.choose(2) == 0)
             }
-            18 => {
+            19 => {
                 let body = self.loop_body(depth);
                 self.loops += 1;
                 let condition = self.condition(1);

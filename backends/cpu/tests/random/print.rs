@@ -116,6 +116,10 @@ impl Printer {
                 let line = format!("list[{} % 4u] = {};", self.expr(index), self.expr(value));
                 self.line(&line);
             }
+            Stmt::Through(index, variable, set, value) => {
+                let [index, set, value] = [index, set, value].map(|expr| self.expr(expr));
+                self.line(&format!("{{ let q = &list[{index} % 4u]; u{variable} = {set}; *q = {value} + *q; }}"));
+            }
             Stmt::If(condition, accept, reject) => {
                 let line = format!("if {} {{", self.condition(condition));
                 self.line(&line);
