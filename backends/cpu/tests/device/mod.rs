@@ -1,5 +1,6 @@
 //! A device that runs compute kernels.
 
+use std::io::Write;
 use wgpu::util::DeviceExt;
 
 pub(crate) struct Gpu {
@@ -22,7 +23,8 @@ impl Gpu {
             Ok((device, queue)) => Some(Self { device, queue }),
             Err(reason) => {
                 assert!(std::env::var_os("LIMPID_REQUIRE_DEVICE").is_none(), "{reason}");
-                eprintln!("SKIPPED: {reason}");
+                // Past the harness, which keeps to itself what a passing test prints.
+                let _ = writeln!(std::io::stderr(), "SKIPPED: {reason}");
                 None
             }
         }

@@ -2,6 +2,7 @@
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+use std::io::Write;
 use std::sync::{Arc, Mutex, mpsc};
 
 use glam::{Mat4, UVec2, Vec2, Vec3, camera::rh};
@@ -51,7 +52,8 @@ impl Gpu {
             }
             Err(reason) => {
                 assert!(std::env::var_os("LIMPID_REQUIRE_DEVICE").is_none(), "{reason}");
-                eprintln!("SKIPPED: {reason}");
+                // Past the harness, which keeps to itself what a passing test prints.
+                let _ = writeln!(std::io::stderr(), "SKIPPED: {reason}");
                 None
             }
         }
