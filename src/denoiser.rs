@@ -41,6 +41,7 @@ pub struct Denoiser {
     kernels: Vec<Kernel>,
     frame_index: u32,
     previous: Option<Previous>,
+    started: Option<FrameSchedule>,
 }
 
 impl Denoiser {
@@ -51,7 +52,13 @@ impl Denoiser {
     /// As [`Plan::new`].
     pub fn new(settings: &Settings, size: UVec2) -> Result<Self, Error> {
         let (plan, kernels) = Plan::new(settings, size)?;
-        Ok(Self { settings: settings.clone(), plan, kernels, frame_index: 0, previous: None })
+        Ok(Self::with_plan(settings, plan, kernels))
+    }
+
+    /// A denoiser that runs a plan other than the settings' own: for tests of backends, which have to carry out
+    /// any plan. `kernels` are those of its passes, in order.
+    pub fn with_plan(settings: &Settings, plan: Plan, kernels: Vec<Kernel>) -> Self {
+        Self { settings: settings.clone(), plan, kernels, frame_index: 0, previous: None, started: None }
     }
 
     /// What is allocated and dispatched.
@@ -81,7 +88,8 @@ impl Denoiser {
         let rebuilt = plan != self.plan || settings.reproject.max_history != self.settings.reproject.max_history;
         self.settings = settings.clone();
         if rebuilt {
-            (self.plan, self.kernels, self.previous) = (plan, kernels, None);
+            (self.plan, self.kernels) = (plan, kernels);
+            self.forget();
         }
         Ok(rebuilt)
     }
@@ -95,21 +103,49 @@ impl Denoiser {
     pub fn resize(&mut self, size: UVec2) -> Result<(), Error> {
         frame::check_allocation(size)?;
         self.plan.size = size;
-        self.previous = None;
+        self.forget();
         Ok(())
     }
 
-    /// Goes on to the next frame.
+    fn forget(&mut self) {
+        (self.previous, self.started) = (None, None);
+    }
+
+    /// Goes on to the next frame, for the passes of [`Stage::Classify`](plan::Stage::Classify). Those of
+    /// [`Stage::Denoise`](plan::Stage::Denoise) follow with [`started_frame`](Self::started_frame) and
+    /// [`finish_frame`](Self::finish_frame). A frame that was started and never finished left no history.
     ///
     /// # Errors
     ///
     /// [`Error::Size`], [`Error::Camera`] or [`Error::FrameInput`]; the denoiser is as before then.
     pub fn next_frame(&mut self, inputs: &FrameInputs) -> Result<FrameSchedule, Error> {
-        let constants = frame::constants(&self.settings, inputs, self.plan.size, self.previous)?;
+        let previous = if self.started.is_some() { None } else { self.previous };
+        let constants = frame::constants(&self.settings, inputs, self.plan.size, previous)?;
         let phase = (self.frame_index % 2) as usize;
         self.frame_index = self.frame_index.wrapping_add(1);
         self.previous = Some(Previous { camera: inputs.camera, size: inputs.size });
-        Ok(FrameSchedule { phase, constants })
+        let schedule = FrameSchedule { phase, constants };
+        self.started = Some(schedule.clone());
+        Ok(schedule)
+    }
+
+    /// The frame that was started and not finished yet.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Order`] if there is none.
+    pub fn started_frame(&self) -> Result<&FrameSchedule, Error> {
+        self.started.as_ref().ok_or(Error::Order)
+    }
+
+    /// Ends the frame: all its passes were recorded or run, and the next frame finds their results.
+    pub fn finish_frame(&mut self) {
+        self.started = None;
+    }
+
+    /// Which copy of each pair is that of the frame started last: 0 or 1.
+    pub fn phase(&self) -> usize {
+        (self.frame_index.wrapping_add(1) % 2) as usize
     }
 
     /// Where in the buffer `args` the grid of the ray list is, in bytes: workgroups of 64 rays in x, y and z,

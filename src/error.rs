@@ -46,6 +46,9 @@ pub enum Error {
         /// What it must be.
         expected: &'static str,
     },
+    /// The passes after ray tracing were asked for before those in front of it.
+    #[error("the denoise stage was asked for, but no frame was classified since the last one")]
+    Order,
     /// A kernel failed to parse, validate or specialise. This is a defect of limpid, not of the caller.
     #[error("kernel `{kernel}` failed to {stage}: {report}")]
     Kernel {

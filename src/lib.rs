@@ -56,12 +56,14 @@
 #![forbid(unsafe_code)]
 
 mod denoiser;
+pub mod emit;
 mod error;
 mod frame;
 pub mod kernel;
 pub mod plan;
 pub mod resource;
 pub mod settings;
+pub mod synchronization;
 
 pub use denoiser::{Denoiser, FrameSchedule};
 pub use error::Error;

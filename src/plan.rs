@@ -70,35 +70,6 @@ pub struct Pass {
     pub bindings: Vec<Bound>,
 }
 
-/// How a resource is used at some point of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Usage {
-    /// By a kernel.
-    Kernel(Access),
-    /// As the grid of a dispatch.
-    Indirect,
-}
-
-impl Usage {
-    fn writes(self) -> bool {
-        matches!(self, Self::Kernel(access) if access.writes())
-    }
-}
-
-/// Synchronisation needed before a pass: the later use must see or must not disturb the earlier one.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Barrier {
-    /// Name of the resource.
-    pub resource: String,
-    /// Which copy, named as in this frame.
-    pub copy: Copy,
-    /// The last use before the pass.
-    pub before: Usage,
-    /// The use by the pass.
-    pub after: Usage,
-}
-
 /// Memory that limpid allocates, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Memory {
@@ -393,66 +364,6 @@ impl Plan {
     /// Allocated bytes for each pixel.
     pub fn bytes_per_pixel(&self) -> f64 {
         self.memory().total() as f64 / (f64::from(self.size.x) * f64::from(self.size.y))
-    }
-
-    /// Synchronisation before each pass, in a frame that follows another one.
-    ///
-    /// Between uses that only read there is none, whatever the backend has to do about image layouts.
-    pub fn barriers(&self) -> Vec<Vec<Barrier>> {
-        let mut uses = vec![<[Uses; 2]>::default(); self.resources.len()];
-        let mut barriers = Vec::new();
-        // The first frame only leaves behind what the second one has to wait for.
-        for phase in [0, 1] {
-            barriers = self.passes.iter().map(|pass| self.pass_barriers(pass, phase, &mut uses)).collect();
-        }
-        barriers
-    }
-
-    fn pass_barriers(&self, pass: &Pass, phase: usize, uses: &mut [[Uses; 2]]) -> Vec<Barrier> {
-        let bound = pass.bindings.iter().map(|b| (b.resource.as_str(), b.copy, Usage::Kernel(b.access)));
-        let indirect = match &pass.grid {
-            Grid::Indirect { resource, .. } => Some((resource.as_str(), Current, Usage::Indirect)),
-            Grid::One | Grid::Tiles => None,
-        };
-        let mut barriers = Vec::new();
-        for (name, copy, after) in bound.chain(indirect) {
-            let Some(index) = self.resources.iter().position(|resource| resource.name == name) else { continue };
-            let resource = &self.resources[index];
-            if resource.lifetime != Lifetime::External {
-                let before = uses[index][copy.index(resource.ping_pong, phase)].then(after);
-                barriers.extend(before.into_iter().map(|before| Barrier {
-                    resource: name.to_owned(),
-                    copy,
-                    before,
-                    after,
-                }));
-            }
-        }
-        barriers
-    }
-}
-
-/// How a resource was used since, and including, its last write.
-#[derive(Debug, Clone, Default)]
-struct Uses {
-    write: Option<Usage>,
-    reads: Vec<Usage>,
-}
-
-impl Uses {
-    /// Notes a use and returns the earlier ones that it has to wait for.
-    fn then(&mut self, after: Usage) -> Vec<Usage> {
-        if after.writes() {
-            let reads = std::mem::take(&mut self.reads);
-            let write = self.write.replace(after);
-            // Reads waited for the write before them.
-            return if reads.is_empty() { write.into_iter().collect() } else { reads };
-        }
-        if self.reads.contains(&after) {
-            return Vec::new();
-        }
-        self.reads.push(after);
-        self.write.into_iter().collect()
     }
 }
 

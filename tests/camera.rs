@@ -92,6 +92,7 @@ proptest! {
         let before = Camera { world_to_view: look(eye + prev_shift), view_to_clip: projection.view_to_clip, jitter: Vec2::ZERO };
         let now = Camera { world_to_view: look(eye), jitter, ..before };
         denoiser.next_frame(&FrameInputs::new(before, SIZE)).unwrap();
+        denoiser.finish_frame();
         let c = denoiser.next_frame(&FrameInputs::new(now, SIZE)).unwrap().constants;
 
         let depth = place.2;

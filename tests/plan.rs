@@ -3,10 +3,12 @@
 use std::collections::{HashMap, HashSet};
 
 use glam::{Mat3, Mat4, UVec2, Vec2, Vec3, camera::rh};
+use limpid::emit::{Checks, SpirvOptions, SpirvVersion};
 use limpid::kernel::{BindingKind, Kernel, Overrides, names};
-use limpid::plan::{Grid, Stage, Usage};
+use limpid::plan::{Grid, Stage};
 use limpid::resource::{Access, Kind};
 use limpid::settings::{Channel, Fallback, NormalEncoding, RayList, RaysPerQuad, RoughnessEncoding};
+use limpid::synchronization::Usage;
 use limpid::{Camera, Denoiser, Error, FrameInputs, Plan, Preset, Settings};
 use proptest::prelude::*;
 
@@ -124,7 +126,7 @@ fn every_hazard_has_a_barrier() {
     let mut settings = Settings::default();
     settings.coverage.ray_list = Some(RayList::default());
     let (plan, _) = Plan::new(&settings, SIZE).unwrap();
-    let barriers = plan.barriers();
+    let barriers = plan.dependencies();
     let has = |kernel: &str, resource: &str| {
         let index = plan.passes.iter().position(|pass| pass.kernel == kernel).unwrap();
         barriers[index].iter().any(|barrier| barrier.resource == resource)
@@ -197,7 +199,10 @@ fn bad_input_is_refused_by_name_and_changes_nothing() {
     // Still at the first frame.
     let schedule = denoiser.next_frame(&good).unwrap();
     assert_eq!((schedule.phase, schedule.constants.prev_size), (0, [0, 0]));
+    denoiser.finish_frame();
     assert_eq!(denoiser.next_frame(&good).unwrap().constants.prev_size, [64, 64]);
+    // A frame that was never finished left no history.
+    assert_eq!(denoiser.next_frame(&good).unwrap().constants.prev_size, [0, 0]);
 
     let mut settings = Settings::default();
     settings.reproject.max_history = 0.5;
@@ -215,12 +220,48 @@ fn constants_change_without_a_new_plan() {
     let size = UVec2::new(64, 64);
     let mut denoiser = Denoiser::new(&Settings::default(), size).unwrap();
     denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap();
+    denoiser.finish_frame();
     let mut settings = Settings::default();
     settings.resolve.stability = 0.25;
     assert!(!denoiser.set_settings(&settings).unwrap());
     let constants = denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap().constants;
     assert_eq!((constants.stability, constants.prev_size), (0.25, size.to_array()));
+    denoiser.finish_frame();
     settings.coverage.fallback = Fallback::Black;
     assert!(denoiser.set_settings(&settings).unwrap());
     assert_eq!(denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap().constants.prev_size, [0, 0]);
+}
+
+#[test]
+fn spirv_has_the_version_and_the_bindings_asked_for() {
+    let (_, kernels) = Plan::new(&Settings::default(), SIZE).unwrap();
+    for kernel in &kernels {
+        let versions = [SpirvVersion::V1_0, SpirvVersion::V1_1, SpirvVersion::V1_2, SpirvVersion::V1_3];
+        for (minor, version) in versions.into_iter().enumerate() {
+            for debug_names in [false, true] {
+                let options = SpirvOptions { version, debug_names, ..SpirvOptions::default() };
+                let words = kernel.spirv(&options).unwrap();
+                assert_eq!(words[..2], [0x0723_0203, 0x10000 + 0x100 * minor as u32]);
+                // Instructions: 5 names an id, 71 decorates one, among other things with its binding (33).
+                let mut names = 0;
+                let mut bindings = Vec::new();
+                let mut rest = &words[5..];
+                while let [head, ..] = *rest {
+                    let (instruction, tail) = rest.split_at((head >> 16) as usize);
+                    names += usize::from(head & 0xffff == 5);
+                    if head & 0xffff == 71 && instruction[2] == 33 {
+                        bindings.push(instruction[3]);
+                    }
+                    rest = tail;
+                }
+                assert_eq!(names > 0, debug_names, "{}", kernel.name);
+                bindings.sort_unstable();
+                let mut expected: Vec<_> = kernel.bindings.iter().map(|binding| binding.binding).collect();
+                expected.sort_unstable();
+                assert_eq!(bindings, expected, "{}", kernel.name);
+            }
+        }
+        let robust = SpirvOptions { checks: Checks::Robust, ..SpirvOptions::default() };
+        assert!(kernel.spirv(&robust).unwrap().len() > kernel.spirv(&SpirvOptions::default()).unwrap().len());
+    }
 }

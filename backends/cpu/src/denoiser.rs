@@ -62,9 +62,6 @@ pub struct Denoiser {
     executors: Vec<Executor>,
     allocations: HashMap<String, Allocation>,
     constants: Buffer,
-    /// The frame that was classified and not denoised yet.
-    pending: Option<FrameSchedule>,
-    phase: usize,
     /// Faults by kernel, when kernels are watched.
     faults: Option<Vec<(&'static str, Fault)>>,
 }
@@ -112,7 +109,15 @@ impl Denoiser {
     ///
     /// [`Error::Limpid`] for settings or size; [`Error::Compile`] would be a defect of limpid.
     pub fn new(settings: &Settings, size: UVec2) -> Result<Self, Error> {
-        let core = limpid::Denoiser::new(settings, size)?;
+        Self::with_core(limpid::Denoiser::new(settings, size)?)
+    }
+
+    /// Carries out a plan that is ready.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Compile`].
+    pub fn with_core(core: limpid::Denoiser) -> Result<Self, Error> {
         let compile = |kernel: &limpid::kernel::Kernel| {
             Executor::new(&kernel.module, &kernel.info, kernel.name)
                 .map_err(|source| Error::Compile { kernel: kernel.name, source })
@@ -120,7 +125,7 @@ impl Denoiser {
         let executors = core.kernels().iter().map(compile).collect::<Result<_, _>>()?;
         let allocations = allocate(core.plan());
         let constants = Buffer::zeroed(size_of::<FrameConstants>() / 4);
-        Ok(Self { core, executors, allocations, constants, pending: None, phase: 0, faults: None })
+        Ok(Self { core, executors, allocations, constants, faults: None })
     }
 
     /// What is allocated and dispatched.
@@ -146,27 +151,21 @@ impl Denoiser {
     /// As [`denoise`](Self::denoise).
     pub fn run_classify(&mut self, inputs: &Inputs<'_>, frame: &FrameInputs) -> Result<(), Error> {
         inputs.check(self.core.plan().inputs(), frame.size)?;
-        // A frame that was classified and never denoised left no history.
-        let mut frame = frame.clone();
-        frame.reset |= self.pending.is_some();
-        let schedule = self.core.next_frame(&frame)?;
+        let schedule = self.core.next_frame(frame)?;
         self.constants.write(bytemuck::cast_slice(&[schedule.constants]).iter().copied());
-        self.phase = schedule.phase;
-        self.run_stage(Stage::Classify, inputs, &schedule)?;
-        self.pending = Some(schedule);
-        Ok(())
+        self.run_stage(Stage::Classify, inputs, &schedule)
     }
 
     /// Runs what comes after ray tracing, with the inputs of [`run_classify`](Self::run_classify).
     ///
     /// # Errors
     ///
-    /// [`Error::Order`], or one of the `Input` errors.
+    /// [`limpid::Error::Order`], or one of the `Input` errors.
     pub fn run_denoise(&mut self, inputs: &Inputs<'_>) -> Result<(), Error> {
-        let schedule = self.pending.clone().ok_or(Error::Order)?;
+        let schedule = self.core.started_frame()?.clone();
         inputs.check(self.core.plan().inputs(), UVec2::from_array(schedule.constants.size))?;
         self.run_stage(Stage::Denoise, inputs, &schedule)?;
-        self.pending = None;
+        self.core.finish_frame();
         Ok(())
     }
 
@@ -244,7 +243,7 @@ impl Denoiser {
 
     /// A texture of the plan as it is after the last frame.
     pub fn intermediate_texture(&self, resource: &str, copy: Copy) -> Option<&Texture> {
-        self.intermediate_texture_in(resource, copy, self.phase)
+        self.intermediate_texture_in(resource, copy, self.core.phase())
     }
 
     /// A buffer of the plan as it is after the last frame.

@@ -68,7 +68,4 @@ pub enum Error {
         /// Size of the frame.
         expected: glam::UVec2,
     },
-    /// [`Denoiser::run_denoise`](crate::Denoiser::run_denoise) without `run_classify` before it.
-    #[error("run_denoise was called without run_classify for this frame")]
-    Order,
 }

@@ -58,9 +58,6 @@ pub struct Denoiser {
     /// Group 0 of each pass.
     input_groups: Vec<InputGroups>,
     timing: Option<Timing>,
-    /// The frame whose classify stage is recorded and whose denoise stage is not.
-    pending: Option<FrameSchedule>,
-    phase: usize,
 }
 
 fn own_groups(
@@ -133,10 +130,18 @@ impl Denoiser {
     ///
     /// [`Error::Limpid`] for settings or size, [`Error::Feature`], [`Error::Limit`].
     pub fn new(device: &wgpu::Device, settings: &Settings, size: UVec2, options: Options) -> Result<Self, Error> {
+        Self::with_core(device, limpid::Denoiser::new(settings, size)?, options)
+    }
+
+    /// Carries out a plan that is ready.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Feature`], [`Error::Limit`].
+    pub fn with_core(device: &wgpu::Device, core: limpid::Denoiser, options: Options) -> Result<Self, Error> {
         if options.timestamps && !device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             return Err(Error::Feature { option: "timestamps", feature: wgpu::Features::TIMESTAMP_QUERY });
         }
-        let core = limpid::Denoiser::new(settings, size)?;
         let allocations = Allocations::new(device, core.plan(), options.readable_intermediates)?;
         let pipelines: Vec<_> = core.kernels().iter().map(|kernel| Pipeline::new(device, kernel)).collect();
         let own_groups = own_groups(device, core.plan(), &pipelines, &allocations);
@@ -160,8 +165,6 @@ impl Denoiser {
             constants_slot: 0,
             own_groups,
             timing: None,
-            pending: None,
-            phase: 0,
         })
     }
 
@@ -176,7 +179,6 @@ impl Denoiser {
         self.allocations = Allocations::new(&self.device, core.plan(), self.options.readable_intermediates)?;
         self.own_groups = own_groups(&self.device, core.plan(), &self.pipelines, &self.allocations);
         self.core = core;
-        self.pending = None;
         Ok(())
     }
 
@@ -226,11 +228,7 @@ impl Denoiser {
         frame: &FrameInputs,
     ) -> Result<(), Error> {
         inputs.check(self.core.plan().inputs(), self.core.settings(), frame.size)?;
-        // A frame that was classified and never denoised left no history.
-        let reset = frame.reset || self.pending.is_some();
-        let mut frame = frame.clone();
-        frame.reset = reset;
-        let schedule = self.core.next_frame(&frame)?;
+        let schedule = self.core.next_frame(frame)?;
         if self.options.timestamps && self.timing.is_none() {
             let kernels = self.core.plan().passes.iter().map(|pass| pass.kernel.clone()).collect();
             self.timing = Some(Timing::new(&self.device, queue, kernels));
@@ -238,9 +236,7 @@ impl Denoiser {
         self.constants_slot = (self.constants_slot + 1) % FRAMES_BEFORE_SUBMIT;
         let offset = self.constants_slot * self.constants_stride;
         queue.write_buffer(&self.constants, offset, bytemuck::bytes_of(&schedule.constants));
-        self.phase = schedule.phase;
         self.encode_stage(Stage::Classify, encoder, inputs, &schedule);
-        self.pending = Some(schedule);
         Ok(())
     }
 
@@ -248,16 +244,16 @@ impl Denoiser {
     ///
     /// # Errors
     ///
-    /// [`Error::Order`], or one of the `Input` errors. Nothing was recorded then.
+    /// [`limpid::Error::Order`], or one of the `Input` errors. Nothing was recorded then.
     pub fn encode_denoise(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &Inputs<'_>) -> Result<(), Error> {
-        let schedule = self.pending.clone().ok_or(Error::Order)?;
+        let schedule = self.core.started_frame()?.clone();
         let size = UVec2::from_array(schedule.constants.size);
         inputs.check(self.core.plan().inputs(), self.core.settings(), size)?;
         self.encode_stage(Stage::Denoise, encoder, inputs, &schedule);
         if let Some(timing) = &mut self.timing {
             timing.resolve(encoder);
         }
-        self.pending = None;
+        self.core.finish_frame();
         Ok(())
     }
 
@@ -312,7 +308,7 @@ impl Denoiser {
     }
 
     fn output_pair(&self) -> &(wgpu::Texture, wgpu::TextureView) {
-        let output = self.allocations.texture(self.core.plan(), OUTPUT, Copy::Current, self.phase);
+        let output = self.allocations.texture(self.core.plan(), OUTPUT, Copy::Current, self.core.phase());
         output.expect("every plan has an output")
     }
 
@@ -327,7 +323,7 @@ impl Denoiser {
 
     /// A texture of the plan as it is after the frame recorded last; see [`Options::readable_intermediates`].
     pub fn intermediate_texture(&self, resource: &str, copy: Copy) -> Option<&wgpu::Texture> {
-        self.allocations.texture(self.core.plan(), resource, copy, self.phase).map(|(texture, _)| texture)
+        self.allocations.texture(self.core.plan(), resource, copy, self.core.phase()).map(|(texture, _)| texture)
     }
 
     /// A buffer of the plan; see [`Options::readable_intermediates`].

@@ -71,7 +71,4 @@ pub enum Error {
         /// Unit of both.
         unit: &'static str,
     },
-    /// [`Denoiser::encode_denoise`](crate::Denoiser::encode_denoise) without `encode_classify` before it.
-    #[error("encode_denoise was called without encode_classify for this frame")]
-    Order,
 }

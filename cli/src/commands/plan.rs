@@ -24,11 +24,15 @@ pub(super) struct PlanCommand {
 impl PlanCommand {
     pub(super) fn run(&self) -> Result<()> {
         let (plan, _) = Plan::new(&self.settings.load()?, self.size)?;
-        let barriers: usize = plan.barriers().iter().map(Vec::len).sum();
+        let barriers = plan.barriers().iter().flatten().count();
+        let dependencies = plan.dependencies().iter().flatten().count();
         super::print(&if self.json {
             serde_json::to_string_pretty(&plan)? + "\n"
         } else {
-            format!("{plan}{} dispatches and {barriers} barriers a frame\n", plan.passes.len())
+            format!(
+                "{plan}{} dispatches and {barriers} barriers a frame, for {dependencies} dependencies\n",
+                plan.passes.len()
+            )
         })
     }
 }

@@ -1,0 +1,68 @@
+use naga::back::spv::{self, WriterFlags, ZeroInitializeWorkgroupMemoryMode};
+use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
+
+use super::Checks;
+use crate::Error;
+use crate::kernel::Kernel;
+
+/// Version of SPIR-V. Vulkan 1.0 accepts 1.0, Vulkan 1.1 up to 1.3.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum SpirvVersion {
+    /// 1.0
+    V1_0,
+    /// 1.1
+    V1_1,
+    /// 1.2
+    V1_2,
+    /// 1.3
+    #[default]
+    V1_3,
+}
+
+/// How to write SPIR-V.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SpirvOptions {
+    /// Version.
+    pub version: SpirvVersion,
+    /// Whether to keep the names of variables and functions, for debuggers.
+    pub debug_names: bool,
+    /// What is checked while the kernel runs.
+    pub checks: Checks,
+}
+
+impl Kernel {
+    /// The kernel as SPIR-V for Vulkan. The entry point has the kernel's name; group and number of each binding
+    /// are its descriptor set and binding.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Kernel`]; a defect of limpid.
+    pub fn spirv(&self, options: &SpirvOptions) -> Result<Vec<u32>, Error> {
+        let is_robust = options.checks == Checks::Robust;
+        let policy = if is_robust { BoundsCheckPolicy::Restrict } else { BoundsCheckPolicy::Unchecked };
+        let mut flags = WriterFlags::empty();
+        flags.set(WriterFlags::DEBUG, options.debug_names);
+        let naga_options = spv::Options {
+            lang_version: (1, options.version as u8),
+            flags,
+            bounds_check_policies: BoundsCheckPolicies {
+                index: policy,
+                buffer: policy,
+                image_load: policy,
+                binding_array: policy,
+            },
+            // Kernels write workgroup memory before they read it.
+            zero_initialize_workgroup_memory: ZeroInitializeWorkgroupMemoryMode::None,
+            force_loop_bounding: is_robust,
+            emit_int_div_checks: is_robust,
+            ..spv::Options::default()
+        };
+        let pipeline =
+            spv::PipelineOptions { shader_stage: naga::ShaderStage::Compute, entry_point: self.name.to_owned() };
+        spv::write_vec(&self.module, &self.info, &naga_options, Some(&pipeline)).map_err(|error| Error::Kernel {
+            kernel: self.name,
+            stage: "write SPIR-V",
+            report: error.to_string(),
+        })
+    }
+}

@@ -1,0 +1,172 @@
+//! Barriers of any plan cover every hazard and nothing else.
+
+use glam::UVec2;
+use limpid::plan::{Bound, Grid, Pass, Stage};
+use limpid::resource::{Access, Copy, Count, Kind, Lifetime, Resource};
+use limpid::synchronization::{Barrier, Usage};
+use limpid::{Plan, Settings};
+use proptest::prelude::*;
+
+/// Frames that hazards are looked for in, with the same barriers in each.
+const FRAMES: usize = 7;
+
+fn name(index: usize) -> String {
+    format!("r{index}")
+}
+
+fn any_plan() -> impl Strategy<Value = Plan> {
+    let resources = prop::collection::vec((any::<bool>(), prop::bool::weighted(0.15)), 1..5);
+    let access = prop::sample::select(vec![Access::Read, Access::Read, Access::Write, Access::ReadWrite]);
+    resources.prop_flat_map(move |resources| {
+        let count = resources.len();
+        let binding = (0..count, any::<bool>(), access.clone());
+        let pass = (prop::collection::vec(binding, 0..4), prop::option::weighted(0.3, 0..count));
+        (Just(resources), prop::collection::vec(pass, 1..7)).prop_map(|(resources, passes)| Plan {
+            size: UVec2::splat(8),
+            resources: resources
+                .into_iter()
+                .enumerate()
+                .map(|(i, (ping_pong, external))| Resource {
+                    name: name(i),
+                    kind: Kind::Buffer { stride: 4, count: Count::Fixed(1), indirect: true },
+                    lifetime: if external { Lifetime::External } else { Lifetime::Persistent },
+                    ping_pong,
+                })
+                .collect(),
+            passes: passes.into_iter().map(|(bindings, indirect)| pass_of(&bindings, indirect)).collect(),
+        })
+    })
+}
+
+/// What is written in a pass is bound once in it.
+fn pass_of(bindings: &[(usize, bool, Access)], indirect: Option<usize>) -> Pass {
+    let mut kept: Vec<(usize, bool, Access)> = Vec::new();
+    for binding in bindings {
+        if kept.iter().all(|k| k.0 != binding.0 || (k.2 == Access::Read && binding.2 == Access::Read)) {
+            kept.push(*binding);
+        }
+    }
+    let indirect = indirect.filter(|i| kept.iter().all(|k| k.0 != *i || k.2 == Access::Read));
+    let bound = kept.iter().enumerate().map(|(i, &(resource, previous, access))| Bound {
+        variable: format!("v{i}"),
+        group: 1,
+        binding: i as u32,
+        resource: name(resource),
+        copy: if previous { Copy::Previous } else { Copy::Current },
+        access,
+    });
+    Pass {
+        kernel: String::new(),
+        stage: Stage::Denoise,
+        overrides: Default::default(),
+        grid: indirect.map_or(Grid::One, |resource| Grid::Indirect { resource: name(resource), offset: 0 }),
+        bindings: bound.collect(),
+    }
+}
+
+/// A use of a piece of memory by the pass at a place in a run of frames.
+#[derive(Debug, Clone)]
+struct Use {
+    place: usize,
+    memory: (String, usize),
+    usage: Usage,
+}
+
+fn writes(usage: Usage) -> bool {
+    matches!(usage, Usage::Kernel(Access::Write | Access::ReadWrite))
+}
+
+fn uses(plan: &Plan) -> Vec<Use> {
+    let mut uses = Vec::new();
+    for frame in 0..FRAMES {
+        for (index, pass) in plan.passes.iter().enumerate() {
+            let mut note = |name: &str, copy: Copy, usage| {
+                let resource = plan.resource(name).unwrap();
+                if resource.lifetime != Lifetime::External {
+                    let copy = if !resource.ping_pong {
+                        0
+                    } else if copy == Copy::Current {
+                        frame % 2
+                    } else {
+                        (frame + 1) % 2
+                    };
+                    uses.push(Use { place: frame * plan.passes.len() + index, memory: (name.to_owned(), copy), usage });
+                }
+            };
+            for bound in &pass.bindings {
+                note(&bound.resource, bound.copy, Usage::Kernel(bound.access));
+            }
+            if let Grid::Indirect { resource, .. } = &pass.grid {
+                note(resource, Copy::Current, Usage::Indirect);
+            }
+        }
+    }
+    uses
+}
+
+/// Pairs of uses of the same memory, one of which writes, with nothing between them that orders them.
+fn hazards(plan: &Plan) -> Vec<(Use, Use)> {
+    let uses = uses(plan);
+    let mut hazards = Vec::new();
+    for (i, before) in uses.iter().enumerate() {
+        for after in uses[i + 1..].iter().filter(|after| after.memory == before.memory && after.place > before.place) {
+            if !writes(before.usage) && !writes(after.usage) {
+                continue;
+            }
+            let mut between =
+                uses.iter().filter(|u| u.memory == before.memory && u.place > before.place && u.place < after.place);
+            // A write between orders both; reads between two writes order them.
+            let is_ordered = if writes(before.usage) && writes(after.usage) {
+                between.next().is_some()
+            } else {
+                between.any(|u| writes(u.usage))
+            };
+            if !is_ordered {
+                hazards.push((before.clone(), after.clone()));
+            }
+        }
+    }
+    hazards
+}
+
+fn covers(barriers: &[Option<Barrier>], (before, after): &(Use, Use)) -> bool {
+    (before.place + 1..=after.place).any(|place| {
+        let barrier = barriers[place % barriers.len()];
+        barrier.is_some_and(|b| b.before.contains(before.usage) && b.after.contains(after.usage))
+    })
+}
+
+fn check(plan: &Plan) -> Result<(), TestCaseError> {
+    let barriers = plan.barriers();
+    let hazards = hazards(plan);
+    prop_assert_eq!(barriers.len(), plan.passes.len());
+    for hazard in &hazards {
+        prop_assert!(covers(&barriers, hazard), "{:?} is not covered by {:?}", hazard, barriers);
+    }
+    for place in 0..barriers.len() {
+        let mut fewer = barriers.clone();
+        if fewer[place].take().is_some() {
+            prop_assert!(!hazards.iter().all(|h| covers(&fewer, h)), "{} of {:?} is of no use", place, barriers);
+        }
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(512))]
+
+    #[test]
+    fn barriers_cover_all_hazards_and_no_more(plan in any_plan()) {
+        check(&plan)?;
+    }
+}
+
+#[test]
+fn limpids_own_barriers() {
+    let (plan, _) = Plan::new(&Settings::default(), UVec2::splat(64)).unwrap();
+    check(&plan).unwrap();
+    let passes: Vec<_> =
+        plan.passes.iter().zip(plan.barriers()).filter(|(_, b)| b.is_some()).map(|(p, _)| p.kernel.as_str()).collect();
+    // `fill` only needs what came before `reproject` and runs beside `prefilter`.
+    assert_eq!(passes, ["classify", "indirect_args", "reproject", "prefilter", "resolve_temporal"]);
+}
