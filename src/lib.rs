@@ -60,6 +60,7 @@ pub mod emit;
 mod error;
 mod frame;
 pub mod kernel;
+pub mod memory;
 pub mod plan;
 pub mod resource;
 pub mod settings;

@@ -70,22 +70,6 @@ pub struct Pass {
     pub bindings: Vec<Bound>,
 }
 
-/// Memory that limpid allocates, in bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Memory {
-    /// Kept from frame to frame.
-    pub persistent: u64,
-    /// Needed only while a frame is denoised; may be shared with other work of the caller.
-    pub transient: u64,
-}
-
-impl Memory {
-    /// Both.
-    pub fn total(self) -> u64 {
-        self.persistent + self.transient
-    }
-}
-
 /// Every resource and pass of a denoiser, in the order of execution.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
@@ -352,18 +336,6 @@ impl Plan {
     /// Names of the images that the caller has to supply.
     pub fn inputs(&self) -> impl Iterator<Item = &str> {
         self.resources.iter().filter(|resource| resource.kind == Kind::Input).map(|resource| resource.name.as_str())
-    }
-
-    /// Memory that limpid allocates, without aliasing.
-    pub fn memory(&self) -> Memory {
-        let bytes =
-            |lifetime| self.resources.iter().filter(|r| r.lifetime == lifetime).map(|r| r.bytes(self.size)).sum();
-        Memory { persistent: bytes(Lifetime::Persistent), transient: bytes(Lifetime::Transient) }
-    }
-
-    /// Allocated bytes for each pixel.
-    pub fn bytes_per_pixel(&self) -> f64 {
-        self.memory().total() as f64 / (f64::from(self.size.x) * f64::from(self.size.y))
     }
 }
 

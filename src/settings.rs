@@ -212,6 +212,19 @@ impl Default for Coverage {
     }
 }
 
+/// A setting that is a number.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Number {
+    /// Where in [`Settings`], such as `reproject.max_history`.
+    pub path: &'static str,
+    /// Default, which is the published value.
+    pub default: f32,
+    /// Smallest value.
+    pub low: f32,
+    /// Largest value.
+    pub high: f32,
+}
+
 /// Declares a group of numeric settings: documentation, name, default, range.
 macro_rules! numeric_settings {
     ($(#[$outer:meta])* $group:ident in $path:literal {
@@ -234,6 +247,13 @@ macro_rules! numeric_settings {
         }
 
         impl $group {
+            const NUMBERS: &[Number] = &[$(Number {
+                path: concat!($path, ".", stringify!($field)),
+                default: $default,
+                low: $low as f32,
+                high: $high as f32,
+            },)*];
+
             fn validate(&self) -> Result<(), Error> {
                 $(check_range(concat!($path, ".", stringify!($field)), self.$field, $low, $high,
                     concat!($low, " to ", $high))?;)*
@@ -345,6 +365,11 @@ fn check_range(field: &'static str, value: f32, low: f32, high: f32, expected: &
 }
 
 impl Settings {
+    /// The constants of the passes, with their ranges.
+    pub fn numbers() -> impl Iterator<Item = &'static Number> {
+        Reproject::NUMBERS.iter().chain(Prefilter::NUMBERS).chain(Resolve::NUMBERS)
+    }
+
     /// Checks every number against its documented range.
     ///
     /// # Errors

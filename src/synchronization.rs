@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Plan;
 use crate::plan::{Grid, Pass};
-use crate::resource::{Access, Copy, Lifetime};
+use crate::resource::{Access, Copy, Lifetime, Resource};
 
 /// How a resource is used at some point of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -164,40 +164,51 @@ impl Plan {
 
     /// Dependencies of each pass of several frames in a row.
     fn run_dependencies(&self) -> Vec<Vec<Dependency>> {
+        // Resources that share memory wait for each other as if they were one.
+        let mut slots = vec![0; self.resources.len()];
+        for (slot, indices) in self.memory_slots().into_iter().enumerate() {
+            indices.into_iter().for_each(|index| slots[index] = slot);
+        }
         let mut uses = vec![<[Uses; 2]>::default(); self.resources.len()];
         let frames =
             (0..FRAMES).flat_map(|frame| self.passes.iter().enumerate().map(move |(i, pass)| (frame, i, pass)));
-        frames.map(|(frame, index, pass)| self.pass_dependencies(frame, index, pass, &mut uses)).collect()
+        frames
+            .map(|(frame, index, pass)| {
+                let position = frame * self.passes.len() + index;
+                self.pass_uses(pass)
+                    .flat_map(|(at, copy, usage)| {
+                        let memory = &mut uses[slots[at]][copy.index(self.resources[at].ping_pong, frame % 2)];
+                        // Within a pass there is nothing to wait for.
+                        let before = memory.then(Use { position, usage }).into_iter().filter(|b| b.position < position);
+                        before.map(|before| self.dependency(at, copy, before, frame, usage)).collect::<Vec<_>>()
+                    })
+                    .collect()
+            })
+            .collect()
     }
 
-    fn pass_dependencies(&self, frame: usize, index: usize, pass: &Pass, uses: &mut [[Uses; 2]]) -> Vec<Dependency> {
-        let count = self.passes.len();
+    /// Index of resource, copy and usage of everything of limpid that a pass uses.
+    fn pass_uses(&self, pass: &Pass) -> impl Iterator<Item = (usize, Copy, Usage)> {
         let bound = pass.bindings.iter().map(|b| (b.resource.as_str(), b.copy, Usage::Kernel(b.access)));
         let indirect = match &pass.grid {
             Grid::Indirect { resource, .. } => Some((resource.as_str(), Copy::Current, Usage::Indirect)),
             Grid::One | Grid::Tiles => None,
         };
-        let mut dependencies = Vec::new();
-        for (name, copy, usage) in bound.chain(indirect) {
-            let Some(at) = self.resources.iter().position(|resource| resource.name == name) else { continue };
-            let resource = &self.resources[at];
-            if resource.lifetime == Lifetime::External {
-                continue;
-            }
-            let position = frame * count + index;
-            let before = uses[at][copy.index(resource.ping_pong, frame % 2)].then(Use { position, usage });
-            // Within a pass there is nothing to wait for.
-            dependencies.extend(before.into_iter().filter(|before| before.position < position).map(|before| {
-                Dependency {
-                    resource: name.to_owned(),
-                    copy,
-                    pass: before.position % count,
-                    frames_ago: frame - before.position / count,
-                    before: before.usage,
-                    after: usage,
-                }
-            }));
+        bound.chain(indirect).filter_map(|(name, copy, usage)| {
+            let is_own = |resource: &Resource| resource.name == name && resource.lifetime != Lifetime::External;
+            Some((self.resources.iter().position(is_own)?, copy, usage))
+        })
+    }
+
+    fn dependency(&self, resource: usize, copy: Copy, before: Use, frame: usize, after: Usage) -> Dependency {
+        let count = self.passes.len();
+        Dependency {
+            resource: self.resources[resource].name.clone(),
+            copy,
+            pass: before.position % count,
+            frames_ago: frame - before.position / count,
+            before: before.usage,
+            after,
         }
-        dependencies
     }
 }

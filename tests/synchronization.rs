@@ -15,7 +15,9 @@ fn name(index: usize) -> String {
 }
 
 fn any_plan() -> impl Strategy<Value = Plan> {
-    let resources = prop::collection::vec((any::<bool>(), prop::bool::weighted(0.15)), 1..5);
+    use Lifetime::{External, Persistent, Transient};
+    let lifetime = prop::sample::select(vec![Persistent, Persistent, Transient, Transient, Transient, External]);
+    let resources = prop::collection::vec((any::<bool>(), lifetime), 1..5);
     let access = prop::sample::select(vec![Access::Read, Access::Read, Access::Write, Access::ReadWrite]);
     resources.prop_flat_map(move |resources| {
         let count = resources.len();
@@ -26,11 +28,12 @@ fn any_plan() -> impl Strategy<Value = Plan> {
             resources: resources
                 .into_iter()
                 .enumerate()
-                .map(|(i, (ping_pong, external))| Resource {
+                .map(|(i, (ping_pong, lifetime))| Resource {
                     name: name(i),
-                    kind: Kind::Buffer { stride: 4, count: Count::Fixed(1), indirect: true },
-                    lifetime: if external { Lifetime::External } else { Lifetime::Persistent },
-                    ping_pong,
+                    kind: Kind::Buffer { stride: 4, count: Count::Fixed(1 + i as u64), indirect: true },
+                    lifetime,
+                    // What is gone after the frame needs no second copy.
+                    ping_pong: ping_pong && lifetime != Transient,
                 })
                 .collect(),
             passes: passes.into_iter().map(|(bindings, indirect)| pass_of(&bindings, indirect)).collect(),
@@ -68,7 +71,8 @@ fn pass_of(bindings: &[(usize, bool, Access)], indirect: Option<usize>) -> Pass 
 #[derive(Debug, Clone)]
 struct Use {
     place: usize,
-    memory: (String, usize),
+    /// Slot and copy.
+    memory: (usize, usize),
     usage: Usage,
 }
 
@@ -77,6 +81,8 @@ fn writes(usage: Usage) -> bool {
 }
 
 fn uses(plan: &Plan) -> Vec<Use> {
+    let slots = plan.memory_slots();
+    let slot_of = |name: &str| slots.iter().position(|slot| slot.iter().any(|&i| plan.resources[i].name == name));
     let mut uses = Vec::new();
     for frame in 0..FRAMES {
         for (index, pass) in plan.passes.iter().enumerate() {
@@ -90,7 +96,11 @@ fn uses(plan: &Plan) -> Vec<Use> {
                     } else {
                         (frame + 1) % 2
                     };
-                    uses.push(Use { place: frame * plan.passes.len() + index, memory: (name.to_owned(), copy), usage });
+                    uses.push(Use {
+                        place: frame * plan.passes.len() + index,
+                        memory: (slot_of(name).unwrap(), copy),
+                        usage,
+                    });
                 }
             };
             for bound in &pass.bindings {
@@ -136,6 +146,30 @@ fn covers(barriers: &[Option<Barrier>], (before, after): &(Use, Use)) -> bool {
     })
 }
 
+/// Nothing shares memory while another one is used, and everything has its place.
+fn check_memory(plan: &Plan) -> Result<(), TestCaseError> {
+    let slots = plan.memory_slots();
+    let mut placed: Vec<_> = slots.iter().flatten().copied().collect();
+    placed.sort_unstable();
+    let own = (0..plan.resources.len()).filter(|&i| plan.resources[i].lifetime != Lifetime::External);
+    prop_assert_eq!(placed, own.collect::<Vec<_>>());
+    for slot in slots.iter().filter(|slot| slot.len() > 1) {
+        let mut users: Vec<Option<usize>> = vec![None; plan.passes.len()];
+        for &index in slot {
+            let resource = &plan.resources[index];
+            prop_assert_eq!(resource.lifetime, Lifetime::Transient);
+            for pass in plan.life(&resource.name).into_iter().flatten() {
+                prop_assert_eq!(users[pass].replace(index), None);
+            }
+        }
+    }
+    let (shared, own) = (plan.shared_memory(), plan.memory());
+    prop_assert_eq!(shared.persistent, own.persistent);
+    prop_assert!(shared.transient <= own.transient);
+    prop_assert_eq!(shared.transient < own.transient, slots.iter().any(|slot| slot.len() > 1));
+    Ok(())
+}
+
 fn check(plan: &Plan) -> Result<(), TestCaseError> {
     let barriers = plan.barriers();
     let hazards = hazards(plan);
@@ -153,11 +187,10 @@ fn check(plan: &Plan) -> Result<(), TestCaseError> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(512))]
-
     #[test]
     fn barriers_cover_all_hazards_and_no_more(plan in any_plan()) {
         check(&plan)?;
+        check_memory(&plan)?;
     }
 }
 

@@ -133,6 +133,34 @@ impl Denoiser {
         self.core.plan()
     }
 
+    /// Allocates for another largest size. Compiled kernels stay, history is lost.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Limpid`]; nothing changes then.
+    pub fn resize(&mut self, size: UVec2) -> Result<(), Error> {
+        self.core.resize(size)?;
+        self.allocations = allocate(self.core.plan());
+        Ok(())
+    }
+
+    /// Changes settings. Numbers take effect with the next frame; what changes the plan makes everything anew
+    /// and loses history.
+    ///
+    /// # Errors
+    ///
+    /// As [`Denoiser::new`]; nothing changes then.
+    pub fn set_settings(&mut self, settings: &Settings) -> Result<(), Error> {
+        let mut core = self.core.clone();
+        if core.set_settings(settings)? {
+            let faults = self.faults.take();
+            *self = Self { faults, ..Self::with_core(core)? };
+        } else {
+            self.core = core;
+        }
+        Ok(())
+    }
+
     /// Denoises a frame.
     ///
     /// # Errors

@@ -191,7 +191,7 @@ impl Denoiser {
     pub fn set_settings(&mut self, settings: &Settings) -> Result<(), Error> {
         let mut core = self.core.clone();
         if core.set_settings(settings)? {
-            *self = Self::new(&self.device, settings, core.plan().size, self.options)?;
+            *self = Self::with_core(&self.device, core, self.options)?;
         } else {
             self.core = core;
         }

@@ -1,0 +1,10 @@
+//! A Vulkan device without a window, with images that are filled from memory and read back: what tests and tools
+//! need around a denoiser. An engine has all this already.
+
+mod context;
+mod image;
+mod instance;
+
+pub use context::{Context, ContextOptions, OffscreenError};
+pub use image::UploadedImage;
+pub use instance::device_names;

@@ -1,0 +1,42 @@
+use ash::vk;
+
+use crate::gpu::Synchronization;
+
+/// What a denoiser is made with, beside its settings.
+#[derive(Clone)]
+pub struct Options {
+    /// Frames that may be recorded while the device has not finished earlier ones. At least 1.
+    pub frames_in_flight: usize,
+    /// Pipeline stages in which the caller reads the output and the ray list. Every frame's commands make them
+    /// visible there, and wait for those stages before they are overwritten. `ALL_COMMANDS`, the default, is
+    /// always right; the stages that do read (for example `FRAGMENT_SHADER`) leave more room for overlap.
+    pub reader_stages: vk::PipelineStageFlags,
+    /// Families of all queues on which the output and the ray list are used, when there are several: they are
+    /// then shared by these families without transfers of ownership. Otherwise empty.
+    pub queue_families: Vec<u32>,
+    /// How barriers are recorded.
+    pub synchronization: Synchronization,
+    /// Measures each pass; see [`Denoiser::read_times`](crate::Denoiser::read_times).
+    pub timestamps: bool,
+    /// Lets intermediate images and buffers be copied from, to inspect them.
+    pub readable_intermediates: bool,
+    /// Where pipelines are looked for and stored, or null.
+    pub pipeline_cache: vk::PipelineCache,
+    /// Gives objects and passes names for debuggers. The instance extension `VK_EXT_debug_utils` is enabled.
+    pub debug_utils: Option<ash::ext::debug_utils::Device>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            frames_in_flight: 3,
+            reader_stages: vk::PipelineStageFlags::ALL_COMMANDS,
+            queue_families: Vec::new(),
+            synchronization: Synchronization::default(),
+            timestamps: false,
+            readable_intermediates: false,
+            pipeline_cache: vk::PipelineCache::null(),
+            debug_utils: None,
+        }
+    }
+}

@@ -1,0 +1,116 @@
+use std::collections::BTreeMap;
+use std::fmt;
+
+use crate::Snapshot;
+
+/// How far the values of a resource are apart.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Agreement {
+    /// Values compared: half floats; whole words of guides, buffers and what is not a half float.
+    pub values: usize,
+    /// Values that are the same.
+    pub identical: usize,
+    /// Sum of differences, in steps of a half float.
+    pub steps: f64,
+    /// Largest difference in steps; 1 for words that differ.
+    pub largest: u32,
+    /// Values that differ by more than two steps.
+    pub far: usize,
+}
+
+impl Agreement {
+    fn add(&mut self, steps: u32) {
+        self.values += 1;
+        self.identical += usize::from(steps == 0);
+        self.steps += f64::from(steps);
+        self.largest = self.largest.max(steps);
+        self.far += usize::from(steps > 2);
+    }
+
+    /// Share of values that differ.
+    pub fn differing(&self) -> f64 {
+        (self.values - self.identical) as f64 / self.values.max(1) as f64
+    }
+
+    /// Mean difference in steps.
+    pub fn mean(&self) -> f64 {
+        self.steps / self.values.max(1) as f64
+    }
+}
+
+/// Half floats as integers in their order.
+fn ordered(bits: u32) -> i32 {
+    let magnitude = (bits & 0x7fff) as i32;
+    if bits & 0x8000 == 0 { magnitude } else { -magnitude }
+}
+
+/// Steps from one half float to another.
+fn half_steps(a: u32, b: u32) -> u32 {
+    ordered(a & 0xffff).abs_diff(ordered(b & 0xffff))
+}
+
+/// Agreement by resource.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Table(pub BTreeMap<String, Agreement>);
+
+impl Table {
+    /// Compares what two executors left after the same frame.
+    ///
+    /// # Panics
+    ///
+    /// When they have different resources.
+    pub fn add(&mut self, a: &Snapshot, b: &Snapshot) {
+        assert!(a.0.keys().eq(b.0.keys()));
+        for (name, words) in &a.0 {
+            let others = &b.0[name];
+            assert_eq!(words.len(), others.len(), "{name}");
+            let is_halves = matches!(name.as_str(), "signal" | "previous signal" | "average" | "output");
+            for (index, (&a, &b)) in words.iter().zip(others).enumerate() {
+                let agreement = self.0.entry(name.clone()).or_default();
+                if !is_halves {
+                    agreement.add(u32::from(a != b));
+                    continue;
+                }
+                agreement.add(half_steps(a, b));
+                // The upper half of a signal's second word holds history length and variance, 8 bits each.
+                if name == "signal" && index % 2 == 1 {
+                    let (a, b) = (a >> 16, b >> 16);
+                    let history = self.0.entry("signal history".to_owned()).or_default();
+                    history.add((a & 255).abs_diff(b & 255));
+                    history.add((a >> 8).abs_diff(b >> 8));
+                } else {
+                    agreement.add(half_steps(a >> 16, b >> 16));
+                }
+            }
+        }
+    }
+
+    /// Adds another table.
+    pub fn merge(&mut self, other: &Self) {
+        for (name, agreement) in &other.0 {
+            let into = self.0.entry(name.clone()).or_default();
+            into.values += agreement.values;
+            into.identical += agreement.identical;
+            into.steps += agreement.steps;
+            into.largest = into.largest.max(agreement.largest);
+            into.far += agreement.far;
+        }
+    }
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{:<18}{:>11}{:>11}{:>10}{:>9}{:>11}",
+            "resource", "values", "identical", "mean", "largest", "above 2"
+        )?;
+        for (name, a) in &self.0 {
+            let share = |count: usize| 100.0 * count as f64 / a.values.max(1) as f64;
+            let (identical, far) = (share(a.identical), share(a.far));
+            let (values, mean, largest) = (a.values, a.mean(), a.largest);
+            writeln!(f, "{name:<18}{values:>11}{identical:>10.4}%{mean:>10.5}{largest:>9}{far:>10.5}%")?;
+        }
+        Ok(())
+    }
+}

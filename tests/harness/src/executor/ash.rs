@@ -1,0 +1,138 @@
+use glam::UVec2;
+use limpid::{FrameInputs, Settings};
+use limpid_ash::ash::vk::Format;
+use limpid_ash::offscreen::{Context, ContextOptions, OffscreenError, UploadedImage};
+use limpid_ash::{Denoiser, Inputs, Options, Synchronization};
+
+use super::Executor;
+use crate::{Image, Snapshot, TexelFormat};
+
+/// Which device, and how.
+#[derive(Clone, Default)]
+pub struct AshOptions {
+    /// The first device whose name contains this.
+    pub device: String,
+    /// Whether the validation layer watches.
+    pub validation: bool,
+    /// Whether barriers are those of Vulkan 1.0 although the device knows better ones.
+    pub old_barriers: bool,
+}
+
+/// The ash backend.
+pub struct Ash {
+    name: String,
+    /// Before the context, because it is dropped before it.
+    denoiser: Option<Denoiser>,
+    options: Options,
+    context: Context,
+}
+
+impl Ash {
+    /// Opens a device.
+    ///
+    /// # Panics
+    ///
+    /// When there is none.
+    pub fn open(options: &AshOptions) -> Self {
+        Self::try_open(options).unwrap()
+    }
+
+    /// Opens a device, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// When there is none, or no validation layer.
+    pub fn try_open(options: &AshOptions) -> Result<Self, OffscreenError> {
+        let context =
+            Context::open(&ContextOptions { device: options.device.clone(), validation: options.validation })?;
+        let synchronization = if options.old_barriers { Synchronization::Core1_0 } else { context.synchronization() };
+        let denoiser_options = Options {
+            readable_intermediates: true,
+            timestamps: options.validation && context.has_timestamps(),
+            debug_utils: context.debug_utils(),
+            synchronization,
+            ..Options::default()
+        };
+        let name = format!("ash on {}", context.name());
+        Ok(Self { name, denoiser: None, options: denoiser_options, context })
+    }
+
+    /// What the validation layer said.
+    pub fn messages(&self) -> Vec<String> {
+        self.context.messages()
+    }
+
+    /// The denoiser, once started.
+    pub fn denoiser(&self) -> Option<&Denoiser> {
+        self.denoiser.as_ref()
+    }
+
+    /// Drops the denoiser and returns the bytes that are still allocated.
+    pub fn leaked_bytes(&mut self) -> u64 {
+        self.denoiser = None;
+        self.context.allocated_bytes()
+    }
+}
+
+impl Executor for Ash {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn start(&mut self, core: limpid::Denoiser) {
+        self.denoiser = None;
+        // SAFETY: the context's handles belong together and outlive the denoiser; options say what is enabled.
+        let denoiser = unsafe {
+            Denoiser::with_core(self.context.gpu(), self.context.memory(), core, self.options.clone()).unwrap()
+        };
+        self.denoiser = Some(denoiser);
+    }
+
+    fn resize(&mut self, size: UVec2) {
+        self.denoiser.as_mut().unwrap().resize(size).unwrap();
+    }
+
+    fn set_settings(&mut self, settings: &Settings) {
+        self.denoiser.as_mut().unwrap().set_settings(settings).unwrap();
+    }
+
+    fn frame(&mut self, images: &[Image], frame: &FrameInputs) -> Snapshot {
+        let format = |format| match format {
+            TexelFormat::Rgba16Float => Format::R16G16B16A16_SFLOAT,
+            TexelFormat::Rgba32Float => Format::R32G32B32A32_SFLOAT,
+            TexelFormat::R32Float => Format::R32_SFLOAT,
+            TexelFormat::Rg32Float => Format::R32G32_SFLOAT,
+        };
+        let (context, denoiser) = (&self.context, self.denoiser.as_mut().unwrap());
+        let upload = |image: &Image| {
+            let bytes = bytemuck::cast_slice(&image.words);
+            (image.name, UploadedImage::new(context, format(image.format), image.size, bytes).unwrap())
+        };
+        let uploaded: Vec<_> = images.iter().map(upload).collect();
+        let find = |name| uploaded.iter().find(|(n, _)| *n == name).unwrap().1.input();
+        let inputs = Inputs {
+            radiance: find("radiance"),
+            normal: find("normal"),
+            roughness: find("roughness"),
+            depth: find("depth"),
+            motion: find("motion"),
+            environment: Some(find("environment")),
+        };
+        context
+            .run(|commands| {
+                // SAFETY: `run` records, submits and waits; uploading left the images readable.
+                unsafe { denoiser.record(commands, &inputs, frame) }.unwrap();
+                Ok::<_, OffscreenError>(())
+            })
+            .unwrap();
+        let words = |bytes: Vec<u8>| bytemuck::pod_collect_to_vec::<u8, u32>(&bytes);
+        Snapshot::take(
+            denoiser.plan(),
+            |name, copy| words(context.read_image(&denoiser.intermediate_image(name, copy).unwrap()).unwrap()),
+            |name| {
+                let (buffer, size) = denoiser.intermediate_buffer(name).unwrap();
+                words(context.read_buffer(buffer, size).unwrap())
+            },
+        )
+    }
+}

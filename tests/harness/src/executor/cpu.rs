@@ -1,0 +1,85 @@
+use glam::UVec2;
+use limpid::{FrameInputs, Settings};
+use limpid_cpu::{Denoiser, Inputs, Texture};
+
+use super::Executor;
+use crate::{Image, Snapshot, TexelFormat};
+
+/// The CPU backend.
+#[derive(Default)]
+pub struct Cpu {
+    denoiser: Option<Denoiser>,
+    is_watched: bool,
+}
+
+impl Cpu {
+    /// At full speed.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// In checked mode; see [`faults`](Self::faults).
+    pub fn watched() -> Self {
+        Self { denoiser: None, is_watched: true }
+    }
+
+    /// What kernels did that they must not, as text.
+    pub fn faults(&self) -> Vec<String> {
+        let faults = self.denoiser.iter().flat_map(Denoiser::faults);
+        faults.map(|(kernel, place, fault)| format!("{kernel} {place} {fault:?}")).collect()
+    }
+}
+
+fn texture(image: &Image) -> Texture {
+    let format = match image.format {
+        TexelFormat::Rgba16Float => limpid_cpu::TexelFormat::Rgba16Float,
+        TexelFormat::Rgba32Float => limpid_cpu::TexelFormat::Rgba32Float,
+        TexelFormat::R32Float => limpid_cpu::TexelFormat::R32Float,
+        TexelFormat::Rg32Float => limpid_cpu::TexelFormat::Rg32Float,
+    };
+    let mut texture = Texture::new(format, image.size.x, image.size.y);
+    texture.write(image.words.iter().copied());
+    texture
+}
+
+impl Executor for Cpu {
+    fn name(&self) -> &str {
+        "cpu"
+    }
+
+    fn start(&mut self, core: limpid::Denoiser) {
+        let mut denoiser = Denoiser::with_core(core).unwrap();
+        if self.is_watched {
+            denoiser.watch();
+        }
+        self.denoiser = Some(denoiser);
+    }
+
+    fn resize(&mut self, size: UVec2) {
+        self.denoiser.as_mut().unwrap().resize(size).unwrap();
+    }
+
+    fn set_settings(&mut self, settings: &Settings) {
+        self.denoiser.as_mut().unwrap().set_settings(settings).unwrap();
+    }
+
+    fn frame(&mut self, images: &[Image], frame: &FrameInputs) -> Snapshot {
+        let textures: Vec<_> = images.iter().map(|image| (image.name, texture(image))).collect();
+        let find = |name| &textures.iter().find(|(n, _)| *n == name).unwrap().1;
+        let inputs = Inputs {
+            radiance: find("radiance"),
+            normal: find("normal"),
+            roughness: find("roughness"),
+            depth: find("depth"),
+            motion: find("motion"),
+            environment: Some(find("environment")),
+        };
+        let denoiser = self.denoiser.as_mut().unwrap();
+        denoiser.denoise(&inputs, frame).unwrap();
+        Snapshot::take(
+            denoiser.plan(),
+            |name, copy| denoiser.intermediate_texture(name, copy).unwrap().read(),
+            |name| denoiser.intermediate_buffer(name).unwrap().read(),
+        )
+    }
+}

@@ -1,0 +1,63 @@
+use std::collections::BTreeMap;
+
+use half::f16;
+use limpid::Plan;
+use limpid::resource::{Copy, Kind};
+
+/// All resources of limpid after a frame, as words, by name and copy.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Snapshot(pub BTreeMap<String, Vec<u32>>);
+
+impl Snapshot {
+    /// Reads everything that a plan names, by functions that read a texture and a buffer.
+    pub fn take(
+        plan: &Plan,
+        mut texture: impl FnMut(&str, Copy) -> Vec<u32>,
+        mut buffer: impl FnMut(&str) -> Vec<u32>,
+    ) -> Self {
+        let mut words = BTreeMap::new();
+        for resource in &plan.resources {
+            let name = resource.name.as_str();
+            match resource.kind {
+                Kind::Texture { .. } if resource.ping_pong => {
+                    words.insert(name.to_owned(), texture(name, Copy::Current));
+                    words.insert(format!("previous {name}"), texture(name, Copy::Previous));
+                }
+                Kind::Texture { .. } => {
+                    words.insert(name.to_owned(), texture(name, Copy::Current));
+                }
+                Kind::Buffer { .. } => {
+                    words.insert(name.to_owned(), buffer(name));
+                }
+                Kind::Constants | Kind::Input => {}
+            }
+        }
+        let mut this = Self(words);
+        this.sort_lists();
+        this
+    }
+
+    /// Lists are in the order in which workgroups happened to run.
+    fn sort_lists(&mut self) {
+        let Some(args) = self.0.get("args") else { return };
+        let [listed, left_out, rays] = [3, 7, 11].map(|word| args.get(word).map_or(0, |&count| count as usize));
+        if let Some(tiles) = self.0.get_mut("tiles") {
+            let count = tiles.len();
+            tiles[..listed.min(count)].sort_unstable();
+            tiles[count - left_out.min(count)..].sort_unstable();
+        }
+        if let Some(list) = self.0.get_mut("rays") {
+            let count = list.len();
+            list[..rays.min(count)].sort_unstable();
+            // What lies behind is of earlier frames.
+            list[rays.min(count)..].fill(0);
+        }
+    }
+
+    /// The denoised image: radiance and variance of each texel.
+    pub fn output(&self) -> Vec<[f32; 4]> {
+        let half = |bits: u32| f16::from_bits(bits as u16).to_f32();
+        let texel = |w: &[u32]| [half(w[0]), half(w[0] >> 16), half(w[1]), half(w[1] >> 16)];
+        self.0["output"].chunks_exact(2).map(texel).collect()
+    }
+}
