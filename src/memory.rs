@@ -25,15 +25,20 @@ impl Memory {
 }
 
 impl Plan {
-    /// The passes from the first use of a resource to the last. What the caller reads, such as the ray list, it
-    /// reads before the passes of the next stage. `None` for a resource that no pass uses.
+    /// The passes from the first use of a resource to the last: for what the caller reads to the end of that
+    /// stage. `None` for a resource that no pass uses.
     pub fn life(&self, resource: &str) -> Option<RangeInclusive<usize>> {
         let uses = |pass: &Pass| {
             let indirect = matches!(&pass.grid, Grid::Indirect { resource: grid, .. } if grid == resource);
             indirect || pass.bindings.iter().any(|bound| bound.resource == resource)
         };
         let first = self.passes.iter().position(uses)?;
-        Some(first..=self.passes.iter().rposition(uses)?)
+        let mut last = self.passes.iter().rposition(uses)?;
+        if self.resource(resource).is_some_and(|resource| resource.exported) {
+            let stage = self.passes[last].stage;
+            last = self.passes.iter().rposition(|pass| pass.stage == stage)?;
+        }
+        Some(first..=last)
     }
 
     /// Resources of limpid by the memory that they can share, as indices into `resources`: each on its own, but

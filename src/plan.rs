@@ -84,6 +84,9 @@ pub struct Plan {
 /// Name of the texture that holds the denoised radiance.
 pub const OUTPUT: &str = "output";
 
+/// What the caller reads: the denoised image, and the ray list with its length.
+const EXPORTED: &[&str] = &[OUTPUT, "rays", "args"];
+
 /// A pass before it is known which of its bindings the specialised kernel keeps.
 struct PassTemplate {
     kernel: &'static str,
@@ -204,8 +207,13 @@ const PASSES: &[PassTemplate] = &[
 
 /// All resources that passes can name.
 fn all_resources() -> Vec<Resource> {
-    let resource =
-        |name: &str, kind, lifetime, ping_pong| Resource { name: name.to_owned(), kind, lifetime, ping_pong };
+    let resource = |name: &str, kind, lifetime, ping_pong| Resource {
+        name: name.to_owned(),
+        kind,
+        lifetime,
+        ping_pong,
+        exported: EXPORTED.contains(&name),
+    };
     let texture = |format, extent| Kind::Texture { format, extent };
     let buffer = |stride, count, indirect| Kind::Buffer { stride, count, indirect };
     let input = |name| resource(name, Kind::Input, Lifetime::External, false);

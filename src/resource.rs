@@ -144,6 +144,8 @@ pub struct Resource {
     pub lifetime: Lifetime,
     /// A pair: this frame's copy is last frame's of the next.
     pub ping_pong: bool,
+    /// The caller reads it too, after the stage that writes it and before the next stage does.
+    pub exported: bool,
 }
 
 impl Resource {

@@ -1,21 +1,274 @@
-//! All backends leave the same in memory.
+//! All backends leave the same in memory, whatever the input: a random sequence of frames after the other, on
+//! every executor there is. `PROPTEST_CASES` says how many; `--nocapture` shows the table.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
 
 use glam::UVec2;
-use limpid_harness::{Case, Pixel, Table, executors};
+use limpid::kernel::Kernel;
+use limpid::resource::Copy;
+use limpid::settings::Fallback;
+use limpid_harness::executor::Cpu;
+use limpid_harness::strategy::{Field, FrameSpec, Motion, Normals, Spec, any_spec, set_number};
+use limpid_harness::{Executor, Snapshot, Table, executors};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
+
+/// Largest share of a resource's values that may be more than two half-float steps apart between different
+/// devices in one frame, and how many may be so however small the image is. Exponentials, logarithms and roots
+/// differ by units in the last place between devices.
+const MAX_FAR_SHARE: f64 = 0.01;
+const MAX_FAR_VALUES: usize = 16;
+/// The same for all cases together.
+const MAX_FAR_SHARE_OVERALL: f64 = 0.001;
+/// Those differences now and then decide at a threshold whether a pixel has history: share of pixels for which
+/// that may be so in one frame, and how many may be so however small the image is.
+const MAX_DECISION_SHARE: f64 = 0.01;
+const MAX_DECISIONS: usize = 4;
+/// Values of the output that a pixel's decision reaches through the 8x8 average: 3x3 tiles.
+const DECISION_FOOTPRINT: usize = 24 * 24 * 4;
+
+/// Agreement of pairs of executors so far, and pixels about which they decided differently.
+type Tables = BTreeMap<(usize, usize), (Table, usize)>;
+
+fn fail(what: &str, count: usize, of: usize, frame: usize) -> Result<(), TestCaseError> {
+    Err(TestCaseError::fail(format!("frame {frame}: {count} {what} of {of}")))
+}
+
+fn check_pair(a: &[Snapshot], b: &[Snapshot], total: &mut (Table, usize)) -> Result<(), TestCaseError> {
+    for (frame, (a, b)) in a.iter().zip(b).enumerate() {
+        let mut table = Table::default();
+        table.add(a, b);
+        let pixels = a.0["signal"].len() / 2;
+        let decisions = Table::decisions(a, b);
+        total.1 += decisions;
+        if decisions > MAX_DECISIONS.max((MAX_DECISION_SHARE * pixels as f64) as usize) {
+            return fail("decisions", decisions, pixels, frame);
+        }
+        for (name, agreement) in &table.0 {
+            let allowed = MAX_FAR_VALUES.max((MAX_FAR_SHARE * agreement.values as f64) as usize);
+            if agreement.far > allowed + DECISION_FOOTPRINT * decisions {
+                return fail(&format!("values of {name} far apart"), agreement.far, agreement.values, frame);
+            }
+        }
+        if decisions > 0 {
+            // From here on they have different histories.
+            break;
+        }
+        total.0.merge(&table);
+    }
+    Ok(())
+}
+
+/// What two executors on the same device leave is the same to the last bit.
+fn check_identical(a: &[Snapshot], b: &[Snapshot]) -> Result<(), TestCaseError> {
+    for (frame, (a, b)) in a.iter().zip(b).enumerate() {
+        for (name, words) in &a.0 {
+            let differing = words.iter().zip(&b.0[name]).position(|(a, b)| a != b);
+            prop_assert_eq!(differing, None, "{} of frame {} differs first at this word", name, frame);
+        }
+    }
+    Ok(())
+}
+
+fn check_spec(spec: &Spec, all: &mut [Box<dyn Executor>], tables: &mut Tables) -> Result<(), TestCaseError> {
+    let case = spec.case();
+    let runs: Vec<_> = all.iter_mut().map(|executor| case.run(executor.as_mut())).collect();
+    for (run, executor) in runs.iter().zip(all.iter()) {
+        prop_assert!(run.iter().all(Snapshot::is_finite), "{}: the output is not finite", executor.name());
+    }
+    for i in 0..runs.len() {
+        for j in 0..i {
+            let pair = |error: TestCaseError| match error {
+                TestCaseError::Fail(reason) => {
+                    TestCaseError::fail(format!("{} and {}: {reason}", all[i].name(), all[j].name()))
+                }
+                reject => reject,
+            };
+            if all[i].device() == all[j].device() {
+                check_identical(&runs[i], &runs[j]).map_err(pair)?;
+                continue;
+            }
+            check_pair(&runs[i], &runs[j], tables.entry((i, j)).or_default()).map_err(pair)?;
+        }
+    }
+    Ok(())
+}
 
 #[test]
-fn smoke() {
-    let case = Case::still(UVec2::new(40, 24), 3, |frame, p| {
-        let noise = (p.x * 7919 + p.y * 104_729 + frame * 31) % 17;
-        Pixel { radiance: [noise as f32 / 8.0, 0.5, 0.25, 3.0], ..Pixel::WALL }
+fn random_sequences_are_the_same_everywhere() {
+    let state = RefCell::new((executors(), Tables::new()));
+    let cases = std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(48);
+    let config = Config { source_file: Some(file!()), cases, max_shrink_iters: 400, ..Config::default() };
+    let result = TestRunner::new(config).run(&any_spec(), |spec| {
+        let (all, tables) = &mut *state.borrow_mut();
+        check_spec(&spec, all, tables)
     });
-    let mut all = executors();
-    let runs: Vec<_> = all.iter_mut().map(|executor| case.run(executor.as_mut())).collect();
-    for (run, executor) in runs.iter().zip(&all) {
-        let mut table = Table::default();
-        for (a, b) in runs[0].iter().zip(run) {
-            table.add(a, b);
+    let (all, tables) = state.into_inner();
+    for ((i, j), (table, decisions)) in &tables {
+        println!("{} and {}, {cases} cases, {decisions} decisions\n{table}", all[*i].name(), all[*j].name());
+    }
+    if let Err(error) = result {
+        panic!("{error}");
+    }
+    for (table, _) in tables.values() {
+        for (name, agreement) in &table.0 {
+            assert!((agreement.far as f64) < MAX_FAR_SHARE_OVERALL * agreement.values as f64, "{name}");
         }
-        println!("{}\n{table}", executor.name());
+    }
+}
+
+/// A frame in which nothing is remarkable.
+const CALM: FrameSpec = FrameSpec {
+    scale: (1.0, 1.0),
+    seed: 1,
+    radiance: Field::Noise(0.0, 1.0),
+    hit_distance: Field::Constant(1.0),
+    depth: Field::Constant(4.0),
+    roughness: Field::Constant(0.5),
+    normals: Normals::Facing,
+    normal_length: Field::Constant(1.0),
+    motion: Motion::Uniform(0.0, 0.0),
+    camera_shift: 0.0,
+    camera_turn: 0.0,
+    jitter: (0.0, 0.0),
+    exposure: 1.0,
+    reset: false,
+    resize: None,
+};
+
+/// What random sequences once found, made small.
+#[test]
+fn what_was_found_before() {
+    // The direction to a surface so near that the square of its distance is 0 was not a number.
+    let mut near = Spec {
+        size: UVec2::ONE,
+        settings: Default::default(),
+        later_settings: None,
+        frames: vec![FrameSpec { depth: Field::Constant(1e-30), ..CALM }],
+    };
+    near.settings.conventions.depth = limpid::settings::DepthEncoding::Linear;
+    near.settings.coverage.roughness_threshold = 0.4;
+    near.settings.coverage.fallback = Fallback::Environment;
+    for spec in [near] {
+        check_spec(&spec, &mut executors(), &mut Tables::new()).unwrap();
+    }
+}
+
+/// Moving, noisy surfaces of all kinds, as the teeth of the comparison bite into.
+fn lively() -> Spec {
+    let frame = |seed| FrameSpec {
+        seed,
+        radiance: Field::Noise(0.1, 3.0),
+        hit_distance: Field::Noise(0.5, 5.0),
+        depth: Field::Blocks(11, 3.0, 4.0),
+        roughness: Field::Gradient(0.0, 1.0),
+        normals: Normals::Curved,
+        motion: Motion::Uniform(1.25, -0.5),
+        camera_shift: seed as f32 * 0.01,
+        ..CALM
+    };
+    let mut settings = limpid::Settings::default();
+    settings.conventions.depth = limpid::settings::DepthEncoding::Linear;
+    Spec { size: UVec2::new(72, 40), settings, later_settings: None, frames: (0..5).map(frame).collect() }
+}
+
+fn run_with(change: impl FnOnce(&mut limpid::Settings)) -> Vec<Snapshot> {
+    let mut spec = lively();
+    change(&mut spec.settings);
+    spec.case().run(&mut Cpu::new())
+}
+
+fn is_caught(a: &[Snapshot], b: &[Snapshot]) -> bool {
+    check_pair(a, b, &mut (Table::default(), 0)).is_err()
+}
+
+#[test]
+fn a_wrong_sign_of_motion_is_caught() {
+    let run = |scale: f32| {
+        run_with(|settings| {
+            settings.conventions.motion_scale *= scale;
+            // No cosine is above 1: history is found by motion vectors alone, whatever its colour.
+            settings.reproject.parallax_normal_cosine = 1.0;
+            settings.reproject.surface_color_gate = 10_000.0;
+        })
+    };
+    assert!(!is_caught(&run(1.0), &run(1.0)));
+    assert!(is_caught(&run(1.0), &run(-1.0)));
+}
+
+#[test]
+fn swapped_history_is_caught() {
+    let case = lively().case();
+    let right = case.run(&mut Cpu::new());
+    for resource in ["guide", "signal"] {
+        let (mut plan, kernels) = limpid::Plan::new(&case.settings, case.size).unwrap();
+        let passes = plan.passes.iter_mut().filter(|pass| pass.kernel == "reproject");
+        for bound in passes.flat_map(|pass| &mut pass.bindings).filter(|bound| bound.resource == resource) {
+            bound.copy = match bound.copy {
+                Copy::Current => Copy::Previous,
+                Copy::Previous => Copy::Current,
+            };
+        }
+        let core = limpid::Denoiser::with_plan(&case.settings, plan, kernels);
+        assert!(is_caught(&right, &case.run_plan(&mut Cpu::new(), core)), "{resource}");
+    }
+}
+
+/// The kernel without its barriers.
+fn without_barriers(kernel: &Kernel) -> Kernel {
+    fn strip(block: &naga::Block) -> naga::Block {
+        let mut stripped = naga::Block::new();
+        for (statement, span) in block.clone().span_into_iter() {
+            match statement {
+                naga::Statement::ControlBarrier(_) => {}
+                naga::Statement::Loop { body, continuing, break_if } => {
+                    let body = strip(&body);
+                    stripped.push(naga::Statement::Loop { body, continuing, break_if }, span);
+                }
+                other => stripped.push(other, span),
+            }
+        }
+        stripped
+    }
+    let mut module = kernel.module.clone();
+    let function = &mut module.entry_points[0].function;
+    function.body = strip(&function.body);
+    Kernel { module, ..kernel.clone() }
+}
+
+#[test]
+fn a_missing_workgroup_barrier_is_caught() {
+    let case = lively().case();
+    let (plan, kernels) = limpid::Plan::new(&case.settings, case.size).unwrap();
+    for wrong in ["reproject", "resolve_temporal"] {
+        let broken = |kernel: &Kernel| if kernel.name == wrong { without_barriers(kernel) } else { kernel.clone() };
+        let kernels = kernels.iter().map(broken).collect();
+        let mut watched = Cpu::watched();
+        case.run_plan(&mut watched, limpid::Denoiser::with_plan(&case.settings, plan.clone(), kernels));
+        let faults = watched.faults();
+        assert!(faults.iter().any(|fault| fault.contains(wrong) && fault.contains("Race")), "{wrong}: {faults:?}");
+    }
+}
+
+#[test]
+fn a_constant_that_is_one_percent_off_is_caught() {
+    let right = run_with(|_| ());
+    let (mut differing, mut caught) = (0, Vec::new());
+    for number in limpid::Settings::numbers() {
+        let value = number.default * 1.01;
+        let value = if value > number.high { number.default * 0.99 } else { value };
+        let wrong = run_with(|settings| *settings = set_number(settings, number, value));
+        differing += usize::from(check_identical(&right, &wrong).is_err());
+        if is_caught(&right, &wrong) {
+            caught.push(number.path);
+        }
+    }
+    println!("{differing} constants change bits; between different devices these would be noticed: {caught:?}");
+    // The others decide at thresholds that this scene does not come near to.
+    assert!(differing >= 15);
+    for path in ["reproject.neighborhood_falloff", "prefilter.normal_power", "resolve.stability", "resolve.clip_scale"]
+    {
+        assert!(caught.contains(&path), "{path}");
     }
 }

@@ -34,15 +34,23 @@ fn any_plan() -> impl Strategy<Value = Plan> {
                     lifetime,
                     // What is gone after the frame needs no second copy.
                     ping_pong: ping_pong && lifetime != Transient,
+                    exported: i == 0,
                 })
                 .collect(),
-            passes: passes.into_iter().map(|(bindings, indirect)| pass_of(&bindings, indirect)).collect(),
+            // The first two are the classify stage.
+            passes: passes
+                .into_iter()
+                .enumerate()
+                .map(|(i, (bindings, indirect))| {
+                    pass_of(if i < 2 { Stage::Classify } else { Stage::Denoise }, &bindings, indirect)
+                })
+                .collect(),
         })
     })
 }
 
 /// What is written in a pass is bound once in it.
-fn pass_of(bindings: &[(usize, bool, Access)], indirect: Option<usize>) -> Pass {
+fn pass_of(stage: Stage, bindings: &[(usize, bool, Access)], indirect: Option<usize>) -> Pass {
     let mut kept: Vec<(usize, bool, Access)> = Vec::new();
     for binding in bindings {
         if kept.iter().all(|k| k.0 != binding.0 || (k.2 == Access::Read && binding.2 == Access::Read)) {
@@ -60,7 +68,7 @@ fn pass_of(bindings: &[(usize, bool, Access)], indirect: Option<usize>) -> Pass 
     });
     Pass {
         kernel: String::new(),
-        stage: Stage::Denoise,
+        stage,
         overrides: Default::default(),
         grid: indirect.map_or(Grid::One, |resource| Grid::Indirect { resource: name(resource), offset: 0 }),
         bindings: bound.collect(),
@@ -162,6 +170,10 @@ fn check_memory(plan: &Plan) -> Result<(), TestCaseError> {
                 prop_assert_eq!(users[pass].replace(index), None);
             }
         }
+    }
+    // What the caller reads after the classify stage is still there then.
+    if let (Some(life), true) = (plan.life(&name(0)), plan.passes.len() > 2) {
+        prop_assert!(*life.end() == 1 || *life.end() == plan.passes.len() - 1);
     }
     let (shared, own) = (plan.shared_memory(), plan.memory());
     prop_assert_eq!(shared.persistent, own.persistent);

@@ -79,5 +79,7 @@ fn world_position(pixel: vec2<u32>, depth: f32) -> vec3<f32> {
 
 // Unit direction from the camera to a camera-relative position; all parallel for an orthographic camera.
 fn view_direction(position: vec3<f32>) -> vec3<f32> {
-    return select(normalize(position), frame.forward.xyz, frame.clip_w.y == 0.0);
+    // Scaled first: the square of a length very near or far is no number that can be divided by.
+    let magnitude = max(max(abs(position.x), abs(position.y)), abs(position.z));
+    return select(normalize(position / magnitude), frame.forward.xyz, frame.clip_w.y == 0.0);
 }

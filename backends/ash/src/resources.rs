@@ -5,8 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 use glam::UVec2;
 use limpid::Plan;
-use limpid::plan::OUTPUT;
-use limpid::resource::{Copy, Count, Extent, Format, Kind, Lifetime, Resource};
+use limpid::resource::{Copy, Format, Kind, Lifetime, Resource};
 
 use crate::barrier::{Batch, Side, WHOLE};
 use crate::gpu::Shared;
@@ -279,13 +278,12 @@ fn create(gpu: &Arc<Shared>, resource: &Resource, size: UVec2, options: &Options
     let families = &options.queue_families[..];
     match resource.kind {
         Kind::Texture { format, extent } => {
-            let is_output = resource.name == OUTPUT;
             let mut usage =
                 vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::STORAGE | vk::ImageUsageFlags::TRANSFER_DST;
-            if is_output || options.readable_intermediates {
+            if resource.exported || options.readable_intermediates {
                 usage |= vk::ImageUsageFlags::TRANSFER_SRC;
             }
-            let families = if is_output { families } else { &[] };
+            let families = if resource.exported { families } else { &[] };
             let image = |_| Image::unbound(gpu, &name, format, extent.of(size), usage, families);
             Ok(Entry::Images((0..=usize::from(resource.ping_pong)).map(image).collect::<Result<_, _>>()?))
         }
@@ -294,12 +292,10 @@ fn create(gpu: &Arc<Shared>, resource: &Resource, size: UVec2, options: &Options
             if indirect {
                 usage |= vk::BufferUsageFlags::INDIRECT_BUFFER;
             }
-            // The renderer reads its ray list and how long it is.
-            let is_for_caller = indirect || count == Count::Per(Extent::Full);
-            if is_for_caller || options.readable_intermediates {
+            if resource.exported || options.readable_intermediates {
                 usage |= vk::BufferUsageFlags::TRANSFER_SRC;
             }
-            let families = if is_for_caller { families } else { &[] };
+            let families = if resource.exported { families } else { &[] };
             Ok(Entry::Buffer(Buffer::unbound(gpu, &name, stride * count.of(size), usage, families)?))
         }
         Kind::Constants | Kind::Input => Ok(Entry::External),

@@ -2,7 +2,7 @@
 
 use glam::UVec2;
 use limpid::Plan;
-use limpid::resource::{Copy, Count, Format, Kind, Resource};
+use limpid::resource::{Copy, Format, Kind, Resource};
 
 use crate::Error;
 
@@ -55,7 +55,7 @@ fn allocate(device: &wgpu::Device, resource: &Resource, size: UVec2, readable: b
         Kind::Texture { format, extent } => {
             let extent = extent.of(size);
             let mut usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::STORAGE_BINDING;
-            usage.set(wgpu::TextureUsages::COPY_SRC, readable || resource.name == limpid::plan::OUTPUT);
+            usage.set(wgpu::TextureUsages::COPY_SRC, readable || resource.exported);
             let make = || {
                 let texture = device.create_texture(&wgpu::TextureDescriptor {
                     label: Some(&label),
@@ -75,11 +75,7 @@ fn allocate(device: &wgpu::Device, resource: &Resource, size: UVec2, readable: b
         Kind::Buffer { stride, count, indirect } => {
             let mut usage = wgpu::BufferUsages::STORAGE;
             usage.set(wgpu::BufferUsages::INDIRECT, indirect);
-            // The renderer reads its ray list and how long it is.
-            usage.set(
-                wgpu::BufferUsages::COPY_SRC,
-                readable || indirect || count == Count::Per(limpid::resource::Extent::Full),
-            );
+            usage.set(wgpu::BufferUsages::COPY_SRC, readable || resource.exported);
             let size = stride * count.of(size);
             Allocation::Buffer(device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(&label),

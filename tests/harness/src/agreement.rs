@@ -85,6 +85,17 @@ impl Table {
         }
     }
 
+    /// Pixels whose reprojected history differs by more than two steps of a half float, or in length: where
+    /// two executors decided differently about what last frame shows there.
+    pub fn decisions(a: &Snapshot, b: &Snapshot) -> usize {
+        let differs = |(a, b): (&[u32], &[u32])| {
+            let radiance = [(a[0], b[0]), (a[0] >> 16, b[0] >> 16), (a[1], b[1])];
+            let length = |word: u32| (word >> 16) & 255;
+            radiance.iter().any(|&(a, b)| half_steps(a, b) > 2) || length(a[1]).abs_diff(length(b[1])) > 1
+        };
+        a.0["signal"].chunks_exact(2).zip(b.0["signal"].chunks_exact(2)).filter(|&pair| differs(pair)).count()
+    }
+
     /// Adds another table.
     pub fn merge(&mut self, other: &Self) {
         for (name, agreement) in &other.0 {

@@ -11,7 +11,7 @@ pub mod strategy;
 
 pub use agreement::{Agreement, Table};
 pub use case::{Case, Change, Image, Images, Pixel, Step, TexelFormat, half_bits};
-pub use executor::{Executor, executors};
+pub use executor::{Executor, executors, fastest};
 pub use snapshot::Snapshot;
 
 /// Says on standard error that a test does not run, past the test harness, which keeps to itself what a passing

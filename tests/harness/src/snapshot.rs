@@ -44,14 +44,21 @@ impl Snapshot {
         if let Some(tiles) = self.0.get_mut("tiles") {
             let count = tiles.len();
             tiles[..listed.min(count)].sort_unstable();
-            tiles[count - left_out.min(count)..].sort_unstable();
+            // Left-out tiles grow from the end of what this frame uses.
+            tiles[listed.min(count)..(listed + left_out).min(count)].sort_unstable();
+            // What lies behind is of earlier frames.
+            tiles[(listed + left_out).min(count)..].fill(0);
         }
         if let Some(list) = self.0.get_mut("rays") {
             let count = list.len();
             list[..rays.min(count)].sort_unstable();
-            // What lies behind is of earlier frames.
             list[rays.min(count)..].fill(0);
         }
+    }
+
+    /// Whether every half float of the output is a finite number.
+    pub fn is_finite(&self) -> bool {
+        self.0["output"].iter().all(|word| word & 0x7c00 != 0x7c00 && word & 0x7c00_0000 != 0x7c00_0000)
     }
 
     /// The denoised image: radiance and variance of each texel.

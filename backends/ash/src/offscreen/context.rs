@@ -4,6 +4,7 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
 
+use super::image::{LAYER, Use, change};
 use super::instance::{Instance, device_name, open_device};
 use crate::memory::{GpuAllocator, MemorySource};
 use crate::{Gpu, OwnImage, Synchronization};
@@ -232,13 +233,17 @@ impl Context {
     /// [`OffscreenError`].
     pub fn read_image(&self, image: &OwnImage) -> Result<Vec<u8>, OffscreenError> {
         self.read(u64::from(image.size.x) * u64::from(image.size.y) * 8, |commands, buffer| {
-            let region = vk::BufferImageCopy::default()
-                .image_subresource(super::image::LAYER)
-                .image_extent(vk::Extent3D { width: image.size.x, height: image.size.y, depth: 1 });
+            let region = vk::BufferImageCopy::default().image_subresource(LAYER).image_extent(vk::Extent3D {
+                width: image.size.x,
+                height: image.size.y,
+                depth: 1,
+            });
+            let (device, layout) = (&self.device, Use::COPIED.layout);
             // SAFETY: the image has that size and format, and is not in use.
             unsafe {
-                let layout = vk::ImageLayout::GENERAL;
-                self.device.cmd_copy_image_to_buffer(commands, image.image, layout, buffer, &[region]);
+                change(device, commands, image.image, Use::OWN, Use::COPIED);
+                device.cmd_copy_image_to_buffer(commands, image.image, layout, buffer, &[region]);
+                change(device, commands, image.image, Use::COPIED, Use::OWN);
             }
         })
     }

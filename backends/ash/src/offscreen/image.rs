@@ -15,6 +15,75 @@ pub(super) const LAYER: vk::ImageSubresourceLayers = vk::ImageSubresourceLayers 
 
 const WHOLE: vk::ImageSubresourceRange = crate::barrier::WHOLE;
 
+/// How an image is used.
+#[derive(Clone, Copy)]
+pub(super) struct Use {
+    pub(super) layout: vk::ImageLayout,
+    accesses: vk::AccessFlags,
+    stages: vk::PipelineStageFlags,
+}
+
+impl Use {
+    /// Its content is no longer needed.
+    const DISCARDED: Self = Self {
+        layout: vk::ImageLayout::UNDEFINED,
+        accesses: vk::AccessFlags::empty(),
+        stages: vk::PipelineStageFlags::COMPUTE_SHADER,
+    };
+    /// Copied to.
+    const WRITTEN: Self = Self {
+        layout: vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+        accesses: vk::AccessFlags::TRANSFER_WRITE,
+        stages: vk::PipelineStageFlags::TRANSFER,
+    };
+    /// Read by kernels.
+    const SAMPLED: Self = Self {
+        layout: vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+        accesses: vk::AccessFlags::SHADER_READ,
+        stages: vk::PipelineStageFlags::COMPUTE_SHADER,
+    };
+    /// Copied from.
+    pub(super) const COPIED: Self = Self {
+        layout: vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+        accesses: vk::AccessFlags::TRANSFER_READ,
+        stages: vk::PipelineStageFlags::TRANSFER,
+    };
+    /// limpid's own.
+    pub(super) const OWN: Self = Self {
+        layout: vk::ImageLayout::GENERAL,
+        accesses: vk::AccessFlags::from_raw(
+            vk::AccessFlags::SHADER_READ.as_raw() | vk::AccessFlags::SHADER_WRITE.as_raw(),
+        ),
+        stages: vk::PipelineStageFlags::COMPUTE_SHADER,
+    };
+}
+
+/// Records a change from one use to another.
+///
+/// # Safety
+///
+/// `commands` is being recorded, and `image` is used as `before` says.
+pub(super) unsafe fn change(
+    device: &ash::Device,
+    commands: vk::CommandBuffer,
+    image: vk::Image,
+    before: Use,
+    after: Use,
+) {
+    let barrier = vk::ImageMemoryBarrier::default()
+        .old_layout(before.layout)
+        .src_access_mask(before.accesses)
+        .new_layout(after.layout)
+        .dst_access_mask(after.accesses)
+        .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .image(image)
+        .subresource_range(WHOLE);
+    let flags = vk::DependencyFlags::empty();
+    // SAFETY: as the caller promises.
+    unsafe { device.cmd_pipeline_barrier(commands, before.stages, after.stages, flags, &[], &[], &[barrier]) };
+}
+
 /// An image that is filled from memory, for kernels to read. To be dropped before its context, when the device
 /// has finished with it.
 pub struct UploadedImage<'c> {
@@ -123,35 +192,18 @@ impl<'c> UploadedImage<'c> {
     }
 
     fn record_copy(&self, commands: vk::CommandBuffer, buffer: vk::Buffer) {
-        use vk::{AccessFlags as Access, ImageLayout as Layout, PipelineStageFlags as Stage};
-        let change = |before: (Layout, Access, Stage), after: (Layout, Access, Stage)| {
-            let barrier = vk::ImageMemoryBarrier::default()
-                .old_layout(before.0)
-                .src_access_mask(before.1)
-                .new_layout(after.0)
-                .dst_access_mask(after.1)
-                .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-                .image(self.image)
-                .subresource_range(WHOLE);
-            let flags = vk::DependencyFlags::empty();
-            // SAFETY: commands are being recorded, the image is alive.
-            unsafe {
-                self.context.device().cmd_pipeline_barrier(commands, before.2, after.2, flags, &[], &[], &[barrier]);
-            }
-        };
-        let written = (Layout::TRANSFER_DST_OPTIMAL, Access::TRANSFER_WRITE, Stage::TRANSFER);
-        change((Layout::UNDEFINED, Access::empty(), Stage::COMPUTE_SHADER), written);
         let region = vk::BufferImageCopy::default().image_subresource(LAYER).image_extent(vk::Extent3D {
             width: self.size.x,
             height: self.size.y,
             depth: 1,
         });
-        // SAFETY: the buffer holds as many bytes as the image.
+        let device = self.context.device();
+        // SAFETY: commands are being recorded; the buffer holds as many bytes as the image.
         unsafe {
-            self.context.device().cmd_copy_buffer_to_image(commands, buffer, self.image, written.0, &[region]);
+            change(device, commands, self.image, Use::DISCARDED, Use::WRITTEN);
+            device.cmd_copy_buffer_to_image(commands, buffer, self.image, Use::WRITTEN.layout, &[region]);
+            change(device, commands, self.image, Use::WRITTEN, Use::SAMPLED);
         }
-        change(written, (Layout::SHADER_READ_ONLY_OPTIMAL, Access::SHADER_READ, Stage::COMPUTE_SHADER));
     }
 
     /// The image as an input of a denoiser.

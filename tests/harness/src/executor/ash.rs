@@ -20,7 +20,6 @@ pub struct AshOptions {
 
 /// The ash backend.
 pub struct Ash {
-    name: String,
     /// Before the context, because it is dropped before it.
     denoiser: Option<Denoiser>,
     options: Options,
@@ -53,8 +52,7 @@ impl Ash {
             synchronization,
             ..Options::default()
         };
-        let name = format!("ash on {}", context.name());
-        Ok(Self { name, denoiser: None, options: denoiser_options, context })
+        Ok(Self { denoiser: None, options: denoiser_options, context })
     }
 
     /// What the validation layer said.
@@ -75,8 +73,12 @@ impl Ash {
 }
 
 impl Executor for Ash {
-    fn name(&self) -> &str {
-        &self.name
+    fn backend(&self) -> &'static str {
+        "ash"
+    }
+
+    fn device(&self) -> &str {
+        self.context.name()
     }
 
     fn start(&mut self, core: limpid::Denoiser) {

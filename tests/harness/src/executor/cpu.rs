@@ -43,8 +43,12 @@ fn texture(image: &Image) -> Texture {
 }
 
 impl Executor for Cpu {
-    fn name(&self) -> &str {
+    fn backend(&self) -> &'static str {
         "cpu"
+    }
+
+    fn device(&self) -> &str {
+        "the CPU"
     }
 
     fn start(&mut self, core: limpid::Denoiser) {

@@ -9,7 +9,7 @@ use crate::{Image, Snapshot, TexelFormat};
 
 /// The wgpu backend on a Vulkan device.
 pub struct Wgpu {
-    name: String,
+    device_name: String,
     device: wgpu::Device,
     queue: wgpu::Queue,
     denoiser: Option<Denoiser>,
@@ -26,7 +26,7 @@ impl Wgpu {
         let errors = Arc::new(Mutex::new(Vec::new()));
         let log = Arc::clone(&errors);
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| log.lock().unwrap().push(error.to_string())));
-        Some(Self { name: format!("wgpu on {device_name}"), device, queue, denoiser: None, errors })
+        Some(Self { device_name: device_name.to_owned(), device, queue, denoiser: None, errors })
     }
 
     fn upload(&self, image: &Image) -> wgpu::TextureView {
@@ -90,8 +90,12 @@ impl Wgpu {
 }
 
 impl Executor for Wgpu {
-    fn name(&self) -> &str {
-        &self.name
+    fn backend(&self) -> &'static str {
+        "wgpu"
+    }
+
+    fn device(&self) -> &str {
+        &self.device_name
     }
 
     fn start(&mut self, core: limpid::Denoiser) {

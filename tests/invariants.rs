@@ -1,0 +1,236 @@
+//! What must hold whatever the backend, on the fastest one there is.
+
+use std::cell::RefCell;
+
+use glam::UVec2;
+use limpid::Preset;
+use limpid::settings::{DepthEncoding, Fallback};
+use limpid_harness::executor::Cpu;
+use limpid_harness::strategy::{any_spec, noise};
+use limpid_harness::{Case, Executor, Pixel, Snapshot, fastest};
+use proptest::prelude::*;
+use proptest::test_runner::{Config, TestRunner};
+
+/// One rounding of a half float, relative.
+const HALF_STEP: f32 = 1.0 / 1024.0;
+
+/// Runs a property on many values with one executor.
+fn for_all<S: Strategy>(
+    cases: u32,
+    strategy: S,
+    property: impl Fn(&mut dyn Executor, S::Value) -> Result<(), TestCaseError>,
+) {
+    let executor = RefCell::new(fastest());
+    let cases = std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(cases);
+    let config = Config { source_file: Some(file!()), cases, ..Config::default() };
+    let result = TestRunner::new(config).run(&strategy, |value| property(executor.borrow_mut().as_mut(), value));
+    if let Err(error) = result {
+        panic!("{error}");
+    }
+}
+
+/// A still scene of some size, roughness and noise seed.
+fn any_still() -> impl Strategy<Value = (UVec2, f32, u32)> {
+    ((1u32..50, 1u32..50).prop_map(UVec2::from), 0.05f32..1.0, 0u32..1000)
+}
+
+/// Every texel of the output of the last frame within the size of the image.
+fn last_output(run: &[Snapshot]) -> Vec<[f32; 4]> {
+    run.last().map(Snapshot::output).unwrap_or_default()
+}
+
+#[test]
+fn constant_radiance_stays_what_it_is() {
+    let radiance = prop::array::uniform3(0.0f32..100.0);
+    for_all(24, (any_still(), radiance, any::<bool>()), |executor, ((size, roughness, _), radiance, is_reference)| {
+        let [r, g, b] = radiance;
+        let mut case = Case::still(size, 4, |_, _| Pixel { radiance: [r, g, b, 3.0], roughness, ..Pixel::WALL });
+        if is_reference {
+            case.settings = Preset::Reference.settings();
+            case.settings.conventions.depth = DepthEncoding::Linear;
+        }
+        for output in case.run(executor).iter().map(Snapshot::output) {
+            for texel in output {
+                for (out, expected) in texel.into_iter().zip(radiance) {
+                    // Rounded when it is stored as input, history, average and output, and by the clip's floor.
+                    let allowed = 4.0 * HALF_STEP * expected + 0.0011;
+                    prop_assert!((out - expected).abs() <= allowed, "{} became {}", expected, out);
+                }
+            }
+        }
+        Ok(())
+    });
+}
+
+#[test]
+fn brightness_and_exposure_cancel() {
+    for_all(16, (any_still(), -6i32..=6), |executor, ((size, roughness, seed), stops)| {
+        let factor = f32::from(2.0).powi(stops);
+        let case = |factor: f32| {
+            let mut case = Case::still(size, 4, |frame, p| {
+                let value = 0.25 + noise(seed + frame, p);
+                Pixel { radiance: [value * factor, 0.5 * factor, factor, 3.0], roughness, ..Pixel::WALL }
+            });
+            case.steps.iter_mut().for_each(|step| step.frame.exposure = 1.0 / factor);
+            case
+        };
+        let plain = last_output(&case(1.0).run(executor));
+        let scaled = last_output(&case(factor).run(executor));
+        for (plain, scaled) in plain.iter().zip(&scaled) {
+            // A power of two changes no digit.
+            let expected = [plain[0] * factor, plain[1] * factor, plain[2] * factor, plain[3]];
+            prop_assert_eq!(&expected, scaled);
+        }
+        Ok(())
+    });
+}
+
+#[test]
+fn a_mirrored_scene_gives_a_mirrored_image() {
+    let sizes = (1u32..5, 1u32..40).prop_map(|(tiles, height)| UVec2::new(8 * tiles, height));
+    for_all(16, (sizes, 0.1f32..1.0, 0u32..1000), |executor, (size, roughness, seed)| {
+        let pixel = |frame: u32, p: UVec2| {
+            let value = 1.0 + 0.2 * noise(seed + frame, p);
+            let depth = if p.x < size.x / 3 { 3.0 } else { 4.0 };
+            Pixel { radiance: [value, value, value, 3.0], roughness, depth, motion: [0.01, 0.0], ..Pixel::WALL }
+        };
+        let mirrored = |frame: u32, p: UVec2| {
+            let pixel = pixel(frame, UVec2::new(size.x - 1 - p.x, p.y));
+            Pixel { motion: [-pixel.motion[0], pixel.motion[1]], ..pixel }
+        };
+        let plain = last_output(&Case::still(size, 4, pixel).run(executor));
+        let flipped = last_output(&Case::still(size, 4, mirrored).run(executor));
+        let row = |output: &[[f32; 4]], y: u32| output[(y * size.x) as usize..((y + 1) * size.x) as usize].to_vec();
+        let mut difference = 0.0;
+        for y in 0..size.y {
+            let (plain, mut flipped) = (row(&plain, y), row(&flipped, y));
+            flipped.reverse();
+            for (a, b) in plain.iter().zip(&flipped) {
+                // The taps of the published prefilter are not symmetric: of noise of 20 % a part is left, that differs.
+                prop_assert!((a[0] - b[0]).abs() < 0.08, "{} and {}", a[0], b[0]);
+                difference += f64::from(a[0] - b[0]);
+            }
+        }
+        // On average both are the same.
+        prop_assert!((difference / f64::from(size.element_product())).abs() < 0.004);
+        Ok(())
+    });
+}
+
+#[test]
+fn a_still_image_comes_to_rest() {
+    for_all(8, any_still(), |executor, (size, roughness, seed)| {
+        let case = Case::still(size, 60, |_, p| {
+            let value = noise(seed, p);
+            Pixel { radiance: [value, value * 0.5, 1.0, 3.0], roughness, ..Pixel::WALL }
+        });
+        let run = case.run(executor);
+        let change = |a: &Snapshot, b: &Snapshot| {
+            let pairs = a.output().into_iter().zip(b.output());
+            pairs.map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0f32, f32::max)
+        };
+        let early = change(&run[1], &run[2]);
+        let late = change(&run[58], &run[59]);
+        prop_assert!(late <= 2.0 * HALF_STEP, "still moves by {}, at first by {}", late, early);
+        Ok(())
+    });
+}
+
+/// Pixels around one that a single frame's value can reach: three tiles for the 8x8 average, then what the next
+/// frames' neighbourhoods add.
+const FOOTPRINT: i32 = 24;
+
+#[test]
+fn what_is_no_number_counts_as_black_and_is_soon_forgotten() {
+    let poison = prop::sample::select(vec![f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0]);
+    let place = (0.0f32..1.0, 0.0f32..1.0);
+    for_all(12, (any_still(), poison, place), |executor, ((size, roughness, seed), poison, place)| {
+        let at = (size.as_vec2() * glam::Vec2::from(place)).as_uvec2().min(size - 1);
+        let run = |executor: &mut dyn Executor, value: Option<f32>| {
+            let case = Case::still(size, 40, |frame, p| {
+                let mut radiance = [0.5 + noise(seed + frame, p), 0.5, 1.0, 3.0];
+                if let Some(value) = value.filter(|_| frame == 2 && p == at) {
+                    radiance = [value, value, value, 3.0];
+                }
+                Pixel { radiance, roughness, ..Pixel::WALL }
+            });
+            case.run(executor)
+        };
+        let (poisoned, black, clean) = (run(executor, Some(poison)), run(executor, Some(0.0)), run(executor, None));
+        for (poisoned, black) in poisoned.iter().zip(&black) {
+            prop_assert_eq!(poisoned.output(), black.output());
+        }
+        let outputs = poisoned[2].output().into_iter().zip(clean[2].output());
+        for (index, _) in outputs.enumerate().filter(|(_, (a, b))| a != b) {
+            let p = glam::IVec2::new(index as i32 % size.x as i32, index as i32 / size.x as i32);
+            let reach = (p - at.as_ivec2()).abs().max_element();
+            prop_assert!(reach <= FOOTPRINT, "reaches {} pixels", reach);
+        }
+        let last = last_output(&poisoned).into_iter().zip(last_output(&clean));
+        for (a, b) in last {
+            prop_assert!((a[0] - b[0]).abs() <= 0.05 * b[0], "{} instead of {}", a[0], b[0]);
+        }
+        Ok(())
+    });
+}
+
+#[test]
+fn the_sky_keeps_its_fallback() {
+    for_all(12, (any_still(), any::<bool>()), |executor, ((size, roughness, seed), is_black)| {
+        let is_sky = |p: UVec2| noise(seed ^ 77, p / 5) < 0.5;
+        let mut case = Case::still(size, 3, |frame, p| {
+            let depth = if is_sky(p) { 0.0 } else { 4.0 };
+            // Exact in half floats.
+            let value = (noise(seed + frame, p) * 64.0).floor() / 64.0;
+            Pixel { radiance: [value; 4], roughness, depth, ..Pixel::WALL }
+        });
+        case.settings.coverage.fallback = if is_black { Fallback::Black } else { Fallback::Input };
+        let run = case.run(executor);
+        for (step, snapshot) in case.steps.iter().zip(&run) {
+            for (index, texel) in snapshot.output().into_iter().enumerate() {
+                let p = UVec2::new(index as u32 % size.x, index as u32 / size.x);
+                if is_sky(p) {
+                    let [r, g, b, _] = step.images.pixels[index].radiance;
+                    let expected = if is_black { [0.0; 4] } else { [r, g, b, 0.0] };
+                    prop_assert_eq!(texel, expected);
+                }
+            }
+        }
+        Ok(())
+    });
+}
+
+#[test]
+fn the_output_stays_between_the_darkest_and_the_brightest_input() {
+    for_all(16, (any_still(), 0.0f32..10.0, 0.01f32..1000.0), |executor, ((size, roughness, seed), low, range)| {
+        let mut case = Case::still(size, 6, |frame, p| {
+            let value = low + range * noise(seed + frame, p);
+            Pixel { radiance: [value, value, value, 3.0], roughness, ..Pixel::WALL }
+        });
+        case.settings = Preset::Reference.settings();
+        case.settings.conventions.depth = DepthEncoding::Linear;
+        case.settings.coverage.roughness_threshold = 1.0;
+        for texel in case.run(executor).iter().flat_map(Snapshot::output) {
+            let slack = 0.002 + 4.0 * HALF_STEP * texel[0];
+            prop_assert!(texel[0] >= low - slack && texel[0] <= low + range + slack, "{}", texel[0]);
+        }
+        Ok(())
+    });
+}
+
+/// The checked mode of the CPU runs workgroups one after the other, the other mode as threads come.
+#[test]
+fn the_order_of_workgroups_does_not_matter() {
+    let cases = std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(16);
+    let config = Config { source_file: Some(file!()), cases, ..Config::default() };
+    let result = TestRunner::new(config).run(&any_spec(), |spec| {
+        let case = spec.case();
+        let mut watched = Cpu::watched();
+        prop_assert_eq!(case.run(&mut watched), case.run(&mut Cpu::new()));
+        prop_assert_eq!(watched.faults(), Vec::<String>::new());
+        Ok(())
+    });
+    if let Err(error) = result {
+        panic!("{error}");
+    }
+}
