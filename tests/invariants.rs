@@ -65,7 +65,7 @@ fn constant_radiance_stays_what_it_is() {
 #[test]
 fn brightness_and_exposure_cancel() {
     for_all(16, (any_still(), -6i32..=6), |executor, ((size, roughness, seed), stops)| {
-        let factor = f32::from(2.0).powi(stops);
+        let factor = 2.0f32.powi(stops);
         let case = |factor: f32| {
             let mut case = Case::still(size, 4, |frame, p| {
                 let value = 0.25 + noise(seed + frame, p);

@@ -5,7 +5,6 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use glam::UVec2;
 use half::f16;
-use limpid::settings::DepthEncoding;
 use limpid::{FrameInputs, Plan, Settings};
 use limpid_cpu::{Denoiser, Inputs, TexelFormat, Texture};
 
@@ -19,10 +18,7 @@ pub(super) struct Cpu {
 
 impl Cpu {
     pub(super) fn open(settings: &Settings, size: UVec2) -> Result<Self> {
-        // Sequences hold linear depth.
-        let mut settings = settings.clone();
-        settings.conventions.depth = DepthEncoding::Linear;
-        let denoiser = Denoiser::new(&settings, size)?;
+        let denoiser = Denoiser::new(settings, size)?;
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         Ok(Self { description: format!("the CPU ({threads} threads, no driver)"), denoiser })
     }

@@ -6,7 +6,6 @@ use std::time::Duration;
 use anyhow::{Context, Result, anyhow};
 use glam::UVec2;
 use half::f16;
-use limpid::settings::DepthEncoding;
 use limpid::{FrameInputs, Plan, Settings};
 use limpid_wgpu::{Denoiser, Inputs, Options, PassTime};
 
@@ -113,13 +112,10 @@ impl Images {
 
 impl Gpu {
     pub(super) fn open(settings: &Settings, size: UVec2) -> Result<Self> {
-        // Sequences hold linear depth.
-        let mut settings = settings.clone();
-        settings.conventions.depth = DepthEncoding::Linear;
         let (description, device, queue) = open_device()?;
         let timestamps = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         let options = Options { timestamps, ..Default::default() };
-        let denoiser = Denoiser::new(&device, &settings, size, options)?;
+        let denoiser = Denoiser::new(&device, settings, size, options)?;
         let images = Images::new(&device, size);
         Ok(Self { description, device, queue, denoiser, images })
     }

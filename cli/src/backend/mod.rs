@@ -2,6 +2,7 @@
 
 mod cpu;
 mod gpu;
+mod vulkan;
 
 use std::time::{Duration, Instant};
 
@@ -10,6 +11,7 @@ use clap::ValueEnum;
 use cpu_time::ProcessTime;
 use glam::UVec2;
 use half::f16;
+use limpid::settings::DepthEncoding;
 use limpid::{Plan, Settings};
 
 use crate::sequence::Frame;
@@ -68,6 +70,8 @@ pub enum Choice {
     Auto,
     /// wgpu: Vulkan, Metal or Direct3D 12.
     Wgpu,
+    /// ash: Vulkan alone.
+    Ash,
     /// The CPU alone, without any driver.
     Cpu,
 }
@@ -80,7 +84,12 @@ pub enum Choice {
 pub fn open(choice: Choice, settings: &Settings, size: UVec2) -> Result<Box<dyn Backend>> {
     // What limpid itself refuses, every backend would.
     Plan::new(settings, size)?;
+    // Sequences hold linear depth.
+    let mut settings = settings.clone();
+    settings.conventions.depth = DepthEncoding::Linear;
+    let settings = &settings;
     match choice {
+        Choice::Ash => Ok(Box::new(vulkan::Vulkan::open(settings, size)?)),
         Choice::Wgpu => Ok(Box::new(gpu::Gpu::open(settings, size)?)),
         Choice::Cpu => Ok(Box::new(cpu::Cpu::open(settings, size)?)),
         Choice::Auto => match gpu::Gpu::open(settings, size) {

@@ -44,7 +44,7 @@ impl Field {
             Self::Noise(a, b) => a + (b - a) * noise(seed, p),
             Self::Blocks(block, a, b) => {
                 let block = p / block.max(1);
-                if (block.x + block.y) % 2 == 0 { a } else { b }
+                if (block.x + block.y).is_multiple_of(2) { a } else { b }
             }
             Self::Sprinkled(value, other, share) => {
                 if noise(seed, p) < share {
@@ -140,7 +140,7 @@ impl Motion {
             Self::Shear(by) => Vec2::new(from_middle.y * by, 0.0),
             Self::Random(reach) => (Vec2::new(noise(seed, p), noise(seed ^ 0x55, p)) * 2.0 - 1.0) * reach / pixels,
             Self::Discontinuous(by) => {
-                let side = if (p.x / 8 + p.y / 8) % 2 == 0 { 1.0 } else { -1.0 };
+                let side = if (p.x / 8 + p.y / 8).is_multiple_of(2) { 1.0 } else { -1.0 };
                 Vec2::splat(side * by) / pixels
             }
             Self::Raw(value) => Vec2::splat(value),
@@ -387,7 +387,7 @@ impl FrameSpec {
             }
             Normals::Curved => Vec3::new(uv.x, -uv.y, 0.7).normalize(),
             Normals::Opposite => {
-                if (p.x / 8 + p.y / 8) % 2 == 0 {
+                if (p.x / 8 + p.y / 8).is_multiple_of(2) {
                     Vec3::Z
                 } else {
                     Vec3::NEG_Z

@@ -1,3 +1,5 @@
+use std::cell::Cell;
+use std::marker::PhantomData;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::vk;
@@ -32,6 +34,9 @@ pub enum OffscreenError {
         /// What Vulkan said.
         result: vk::Result,
     },
+    /// The denoiser could not be made or a frame not be recorded.
+    #[error(transparent)]
+    Denoiser(#[from] crate::Error),
     /// There is no memory for an image or a copy.
     #[error("no memory for an off-screen image: {0}")]
     Memory(#[from] gpu_allocator::AllocationError),
@@ -64,6 +69,8 @@ pub struct Context {
     name: String,
     has_timestamps: bool,
     has_synchronization2: bool,
+    /// Commands are recorded from one pool, by one thread at a time.
+    _not_sync: PhantomData<Cell<()>>,
     /// Last, because it is dropped last.
     instance: Instance,
 }
@@ -103,6 +110,7 @@ impl Context {
             name: device_name(&properties),
             has_timestamps: families[queue_family].timestamp_valid_bits > 0,
             has_synchronization2,
+            _not_sync: PhantomData,
             instance,
         };
         let allocator = Allocator::new(&AllocatorCreateDesc {
@@ -197,10 +205,10 @@ impl Context {
     /// # Errors
     ///
     /// What `record` returns, or [`OffscreenError::Vulkan`].
-    pub fn run<T, E: From<OffscreenError>>(
+    pub fn run<T>(
         &self,
-        record: impl FnOnce(vk::CommandBuffer) -> Result<T, E>,
-    ) -> Result<T, E> {
+        record: impl FnOnce(vk::CommandBuffer) -> Result<T, OffscreenError>,
+    ) -> Result<T, OffscreenError> {
         let device = &self.device;
         let info = vk::CommandBufferAllocateInfo::default().command_pool(self.command_pool).command_buffer_count(1);
         // SAFETY: the pool is alive and used by this thread alone, as `Context` is not `Sync`.
@@ -275,7 +283,7 @@ impl Context {
                 let flags = vk::DependencyFlags::empty();
                 self.device.cmd_pipeline_barrier(commands, before, after, flags, &[barrier], &[], &[]);
             }
-            Ok::<_, OffscreenError>(())
+            Ok(())
         });
         let bytes = allocation.mapped_slice().map(|bytes| bytes[..size as usize].to_vec()).unwrap_or_default();
         self.destroy_buffer(buffer, allocation);

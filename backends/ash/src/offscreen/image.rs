@@ -1,3 +1,5 @@
+use std::rc::Rc;
+
 use ash::vk;
 use glam::UVec2;
 use gpu_allocator::MemoryLocation;
@@ -84,10 +86,9 @@ pub(super) unsafe fn change(
     unsafe { device.cmd_pipeline_barrier(commands, before.stages, after.stages, flags, &[], &[], &[barrier]) };
 }
 
-/// An image that is filled from memory, for kernels to read. To be dropped before its context, when the device
-/// has finished with it.
-pub struct UploadedImage<'c> {
-    context: &'c Context,
+/// An image that is filled from memory, for kernels to read.
+pub struct UploadedImage {
+    context: Rc<Context>,
     image: vk::Image,
     view: vk::ImageView,
     allocation: Option<Allocation>,
@@ -95,7 +96,7 @@ pub struct UploadedImage<'c> {
     texel_bytes: u64,
 }
 
-impl Drop for UploadedImage<'_> {
+impl Drop for UploadedImage {
     fn drop(&mut self) {
         // SAFETY: the device has finished with it; null is allowed.
         unsafe {
@@ -117,7 +118,7 @@ fn texel_bytes(format: vk::Format) -> u64 {
     }
 }
 
-impl<'c> UploadedImage<'c> {
+impl UploadedImage {
     /// An image with `bytes` as its texels, row by row.
     ///
     /// # Errors
@@ -128,7 +129,7 @@ impl<'c> UploadedImage<'c> {
     ///
     /// When `bytes` are not as many as the image has, or for formats other than `R32_SFLOAT`, `R32G32_SFLOAT`,
     /// `R16G16B16A16_SFLOAT` and `R32G32B32A32_SFLOAT`.
-    pub fn new(context: &'c Context, format: vk::Format, size: UVec2, bytes: &[u8]) -> Result<Self, OffscreenError> {
+    pub fn new(context: &Rc<Context>, format: vk::Format, size: UVec2, bytes: &[u8]) -> Result<Self, OffscreenError> {
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
             .format(format)
@@ -141,7 +142,7 @@ impl<'c> UploadedImage<'c> {
         // SAFETY: the description is complete.
         let image = unsafe { device.create_image(&info, None) }.map_err(failed("creating an image"))?;
         let mut this = Self {
-            context,
+            context: Rc::clone(context),
             image,
             view: vk::ImageView::null(),
             allocation: None,
@@ -185,7 +186,7 @@ impl<'c> UploadedImage<'c> {
         mapped[..bytes.len()].copy_from_slice(bytes);
         let done = self.context.run(|commands| {
             self.record_copy(commands, buffer);
-            Ok::<_, OffscreenError>(())
+            Ok(())
         });
         self.context.destroy_buffer(buffer, allocation);
         done

@@ -4,7 +4,9 @@
 mod context;
 mod image;
 mod instance;
+mod session;
 
 pub use context::{Context, ContextOptions, OffscreenError};
 pub use image::UploadedImage;
 pub use instance::device_names;
+pub use session::{Session, UploadedInputs};

@@ -1,8 +1,10 @@
+use std::rc::Rc;
+
 use glam::UVec2;
 use limpid::{FrameInputs, Settings};
 use limpid_ash::ash::vk::Format;
-use limpid_ash::offscreen::{Context, ContextOptions, OffscreenError, UploadedImage};
-use limpid_ash::{Denoiser, Inputs, Options, Synchronization};
+use limpid_ash::offscreen::{Context, ContextOptions, OffscreenError, Session, UploadedImage, UploadedInputs};
+use limpid_ash::{Denoiser, Options, Synchronization};
 
 use super::Executor;
 use crate::{Image, Snapshot, TexelFormat};
@@ -20,10 +22,9 @@ pub struct AshOptions {
 
 /// The ash backend.
 pub struct Ash {
-    /// Before the context, because it is dropped before it.
-    denoiser: Option<Denoiser>,
+    session: Option<Session>,
     options: Options,
-    context: Context,
+    context: Rc<Context>,
 }
 
 impl Ash {
@@ -48,11 +49,10 @@ impl Ash {
         let denoiser_options = Options {
             readable_intermediates: true,
             timestamps: options.validation && context.has_timestamps(),
-            debug_utils: context.debug_utils(),
             synchronization,
             ..Options::default()
         };
-        Ok(Self { denoiser: None, options: denoiser_options, context })
+        Ok(Self { session: None, options: denoiser_options, context: Rc::new(context) })
     }
 
     /// What the validation layer said.
@@ -62,12 +62,12 @@ impl Ash {
 
     /// The denoiser, once started.
     pub fn denoiser(&self) -> Option<&Denoiser> {
-        self.denoiser.as_ref()
+        self.session.as_ref().map(Session::denoiser)
     }
 
     /// Drops the denoiser and returns the bytes that are still allocated.
     pub fn leaked_bytes(&mut self) -> u64 {
-        self.denoiser = None;
+        self.session = None;
         self.context.allocated_bytes()
     }
 }
@@ -82,20 +82,16 @@ impl Executor for Ash {
     }
 
     fn start(&mut self, core: limpid::Denoiser) {
-        self.denoiser = None;
-        // SAFETY: the context's handles belong together and outlive the denoiser; options say what is enabled.
-        let denoiser = unsafe {
-            Denoiser::with_core(self.context.gpu(), self.context.memory(), core, self.options.clone()).unwrap()
-        };
-        self.denoiser = Some(denoiser);
+        self.session = None;
+        self.session = Some(Session::new(&self.context, core, self.options.clone()).unwrap());
     }
 
     fn resize(&mut self, size: UVec2) {
-        self.denoiser.as_mut().unwrap().resize(size).unwrap();
+        self.session.as_mut().unwrap().denoiser_mut().resize(size).unwrap();
     }
 
     fn set_settings(&mut self, settings: &Settings) {
-        self.denoiser.as_mut().unwrap().set_settings(settings).unwrap();
+        self.session.as_mut().unwrap().denoiser_mut().set_settings(settings).unwrap();
     }
 
     fn frame(&mut self, images: &[Image], frame: &FrameInputs) -> Snapshot {
@@ -105,14 +101,14 @@ impl Executor for Ash {
             TexelFormat::R32Float => Format::R32_SFLOAT,
             TexelFormat::Rg32Float => Format::R32G32_SFLOAT,
         };
-        let (context, denoiser) = (&self.context, self.denoiser.as_mut().unwrap());
+        let (context, session) = (&self.context, self.session.as_mut().unwrap());
         let upload = |image: &Image| {
             let bytes = bytemuck::cast_slice(&image.words);
             (image.name, UploadedImage::new(context, format(image.format), image.size, bytes).unwrap())
         };
         let uploaded: Vec<_> = images.iter().map(upload).collect();
-        let find = |name| uploaded.iter().find(|(n, _)| *n == name).unwrap().1.input();
-        let inputs = Inputs {
+        let find = |name| &uploaded.iter().find(|(n, _)| *n == name).unwrap().1;
+        let inputs = UploadedInputs {
             radiance: find("radiance"),
             normal: find("normal"),
             roughness: find("roughness"),
@@ -120,13 +116,8 @@ impl Executor for Ash {
             motion: find("motion"),
             environment: Some(find("environment")),
         };
-        context
-            .run(|commands| {
-                // SAFETY: `run` records, submits and waits; uploading left the images readable.
-                unsafe { denoiser.record(commands, &inputs, frame) }.unwrap();
-                Ok::<_, OffscreenError>(())
-            })
-            .unwrap();
+        session.run(&inputs, frame).unwrap();
+        let denoiser = session.denoiser();
         let words = |bytes: Vec<u8>| bytemuck::pod_collect_to_vec::<u8, u32>(&bytes);
         Snapshot::take(
             denoiser.plan(),

@@ -1,0 +1,108 @@
+//! The ash backend on a device without a window.
+
+use std::rc::Rc;
+use std::time::Duration;
+
+use anyhow::{Context as _, Result};
+use glam::UVec2;
+use half::f16;
+use limpid::{FrameInputs, Plan, Settings};
+use limpid_ash::ash::vk::Format;
+use limpid_ash::offscreen::{Context, ContextOptions, Session, UploadedImage, UploadedInputs};
+use limpid_ash::{Denoiser, Options};
+
+use super::{Backend, Denoised, ListedRay, Tracer, timed, to_half, trace_listed};
+use crate::sequence::Frame;
+
+pub(super) struct Vulkan {
+    description: String,
+    session: Session,
+    context: Rc<Context>,
+}
+
+impl Vulkan {
+    pub(super) fn open(settings: &Settings, size: UVec2) -> Result<Self> {
+        let context = Rc::new(Context::open(&ContextOptions::default())?);
+        let options = Options {
+            synchronization: context.synchronization(),
+            timestamps: context.has_timestamps(),
+            ..Options::default()
+        };
+        let description = format!("{} through ash", context.name());
+        let session = Session::new(&context, limpid::Denoiser::new(settings, size)?, options)?;
+        Ok(Self { description, session, context })
+    }
+}
+
+fn upload<T: bytemuck::NoUninit>(
+    context: &Rc<Context>,
+    format: Format,
+    size: UVec2,
+    texels: &[T],
+) -> Result<UploadedImage> {
+    Ok(UploadedImage::new(context, format, size, bytemuck::cast_slice(texels))?)
+}
+
+fn half_texels(radiance: &[[f32; 4]]) -> Vec<[f16; 4]> {
+    radiance.iter().map(|texel| texel.map(to_half)).collect()
+}
+
+fn listed_rays(context: &Context, denoiser: &Denoiser) -> Result<Vec<ListedRay>> {
+    let list = denoiser.ray_list().context("the settings ask for no ray list")?;
+    let args: Vec<u32> = bytemuck::pod_collect_to_vec(&context.read_buffer(list.args, list.args_offset + 16)?);
+    let words: Vec<u32> = bytemuck::pod_collect_to_vec(&context.read_buffer(list.rays, list.rays_size)?);
+    let count = args.last().map_or(0, |&count| count as usize);
+    Ok(words.into_iter().take(count).map(ListedRay::unpack).collect())
+}
+
+fn read_output(context: &Context, denoiser: &Denoiser, size: UVec2) -> Result<Vec<[f32; 3]>> {
+    let output = denoiser.output();
+    let halves: Vec<[f16; 4]> = bytemuck::pod_collect_to_vec(&context.read_image(&output)?);
+    let rows = halves.chunks_exact(output.size.x as usize).take(size.y as usize);
+    let texels = rows.flat_map(|row| &row[..size.x as usize]);
+    Ok(texels.map(|&[r, g, b, _]| [r.to_f32(), g.to_f32(), b.to_f32()]).collect())
+}
+
+impl Backend for Vulkan {
+    fn device(&self) -> &str {
+        &self.description
+    }
+
+    fn plan(&self) -> &Plan {
+        self.session.denoiser().plan()
+    }
+
+    fn denoise(&mut self, frame: &Frame, exposure: f32, tracer: Option<Tracer<'_>>) -> Result<Denoised> {
+        let size = frame.size;
+        let mut frame_inputs = FrameInputs::new(frame.camera, size);
+        frame_inputs.reset = frame.reset;
+        frame_inputs.exposure = exposure;
+        let (session, context) = (&mut self.session, &self.context);
+        let normals: Vec<[f32; 4]> = frame.normal.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect();
+        let normal = upload(context, Format::R32G32B32A32_SFLOAT, size, &normals)?;
+        let roughness = upload(context, Format::R32_SFLOAT, size, &frame.roughness)?;
+        let depth = upload(context, Format::R32_SFLOAT, size, &frame.depth)?;
+        let motion = upload(context, Format::R32G32_SFLOAT, size, &frame.motion)?;
+        let radiance = upload(context, Format::R16G16B16A16_SFLOAT, size, &half_texels(&frame.radiance))?;
+        let (normal, roughness, depth, motion) = (&normal, &roughness, &depth, &motion);
+        let inputs = UploadedInputs { radiance: &radiance, normal, roughness, depth, motion, environment: None };
+        let mut rays = frame.depth.iter().filter(|depth| **depth > 0.0).count() as u64;
+        let (mut time, mut cpu_time) = (Duration::ZERO, Duration::ZERO);
+        let mut traced = None;
+        if let Some(tracer) = tracer {
+            timed(&mut time, &mut cpu_time, || session.run_classify(&inputs, &frame_inputs))?;
+            let listed = listed_rays(context, session.denoiser())?;
+            rays = listed.len() as u64;
+            let values = trace_listed(&listed, size, tracer);
+            radiance.write(bytemuck::cast_slice(&half_texels(&values)))?;
+            traced = Some(values);
+            timed(&mut time, &mut cpu_time, || session.run_denoise(&inputs))?;
+        } else {
+            timed(&mut time, &mut cpu_time, || session.run(&inputs, &frame_inputs))?;
+        }
+        let pass_times = session.denoiser().read_times()?.unwrap_or_default();
+        let pass_times = pass_times.into_iter().map(|time| (time.kernel, time.duration)).collect();
+        let radiance = read_output(context, session.denoiser(), size)?;
+        Ok(Denoised { radiance, time, cpu_time, pass_times, rays, traced })
+    }
+}
