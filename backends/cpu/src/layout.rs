@@ -2,9 +2,18 @@
 
 use naga::{ArraySize, Handle, Module, Type, TypeInner};
 
-/// Number of scalars of a type of fixed size.
+/// Whether a register can hold it.
+pub(crate) fn is_supported(scalar: naga::Scalar) -> bool {
+    scalar.kind == naga::ScalarKind::Bool || scalar.width == 4
+}
+
+/// Number of scalars of a type of fixed size; none for types that are not supported either.
 pub(crate) fn scalar_count(module: &Module, inner: &TypeInner) -> Option<u32> {
     let of = |ty: Handle<Type>| scalar_count(module, &module.types[ty].inner);
+    let scalar = if let TypeInner::Atomic(scalar) = inner { Some(*scalar) } else { inner.scalar() };
+    if scalar.is_some_and(|scalar| !is_supported(scalar)) {
+        return None;
+    }
     match inner {
         TypeInner::Scalar(_) | TypeInner::Atomic(_) => Some(1),
         TypeInner::Vector { size, .. } => Some(*size as u32),

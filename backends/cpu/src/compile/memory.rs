@@ -100,9 +100,10 @@ impl<'a> Compiler<'a> {
     }
 
     pub(super) fn load(&mut self, place: &Place) -> Result<Vec<Operand>> {
-        let offsets = self.offsets(&place.inner);
+        self.count(&place.inner)?;
         match place.root {
             Root::Memory(memory) => {
+                let offsets = self.offsets(&place.inner);
                 let address = self.address(place);
                 if let TypeInner::Atomic(_) = place.inner {
                     // atomicLoad

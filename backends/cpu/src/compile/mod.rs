@@ -7,8 +7,12 @@
 
 mod expression;
 mod flow;
+mod function;
+mod loops;
 mod math;
 mod memory;
+mod packing;
+mod uses;
 
 use std::collections::{HashMap, HashSet};
 
@@ -148,7 +152,8 @@ struct Compiler<'a> {
 type Result<T> = std::result::Result<T, CompileError>;
 
 fn unsupported<T>(construct: impl Into<String>) -> Result<T> {
-    Err(CompileError::Unsupported { construct: construct.into() })
+    // The compiler knows where; see `compile`.
+    Err(CompileError::Unsupported { construct: construct.into(), offset: None })
 }
 
 /// Compiles the entry point of a validated module.
@@ -158,15 +163,16 @@ pub(crate) fn compile(module: &Module, info: &ModuleInfo, entry_point: &str) -> 
         .iter()
         .position(|entry| entry.name == entry_point && entry.stage == naga::ShaderStage::Compute)
         .ok_or_else(|| CompileError::EntryPoint { name: entry_point.to_owned() })?;
-    if !module.overrides.is_empty() {
-        return unsupported("override without a value (specialise the module first)");
+    if let Some((handle, _)) = module.overrides.iter().next() {
+        let error = unsupported("an override without a value (specialise the module first)");
+        return error.map_err(|error| error.at(module.overrides.get_span(handle)));
     }
     let mut facts = Facts::default();
     loop {
-        let mut compiler = Compiler::new(module, info, facts.clone())?;
+        let mut compiler = Compiler::new(module, info, facts.clone());
         let entry = &module.entry_points[index];
-        let function_info = info.get_entry_point(index);
-        compiler.entry_point(entry, function_info)?;
+        let compiled = compiler.globals().and_then(|()| compiler.entry_point(entry, info.get_entry_point(index)));
+        compiled.map_err(|error| error.at(compiler.span))?;
         // Every round finds at least one fact more, of finitely many.
         if compiler.facts == facts {
             return Ok(Code {
@@ -185,8 +191,8 @@ pub(crate) fn compile(module: &Module, info: &ModuleInfo, entry_point: &str) -> 
 }
 
 impl<'a> Compiler<'a> {
-    fn new(module: &'a Module, info: &'a ModuleInfo, facts: Facts) -> Result<Self> {
-        let mut compiler = Self {
+    fn new(module: &'a Module, info: &'a ModuleInfo, facts: Facts) -> Self {
+        Self {
             module,
             info,
             ops: Vec::new(),
@@ -205,12 +211,17 @@ impl<'a> Compiler<'a> {
             depth: 0,
             loops: Vec::new(),
             loop_depth: 0,
-        };
-        for (handle, variable) in module.global_variables.iter() {
-            let value = compiler.global(variable)?;
-            compiler.globals.insert(handle, value);
         }
-        Ok(compiler)
+    }
+
+    fn globals(&mut self) -> Result<()> {
+        for (handle, variable) in self.module.global_variables.iter() {
+            self.span = self.module.global_variables.get_span(handle);
+            let value = self.global(variable)?;
+            self.globals.insert(handle, value);
+        }
+        self.span = naga::Span::UNDEFINED;
+        Ok(())
     }
 
     fn global(&mut self, variable: &GlobalVariable) -> Result<Value> {
@@ -241,9 +252,8 @@ impl<'a> Compiler<'a> {
             },
             AddressSpace::WorkGroup => {
                 let mut layouter = naga::proc::Layouter::default();
-                layouter
-                    .update(self.module.to_ctx())
-                    .map_err(|error| CompileError::Unsupported { construct: format!("type of `{name}`: {error}") })?;
+                let layouts = layouter.update(self.module.to_ctx());
+                layouts.or_else(|error| unsupported(format!("type of `{name}`: {error}")))?;
                 let offset = self.workgroup_words;
                 self.workgroup_words += layouter[variable.ty].size.div_ceil(4);
                 let place = Place { root: Root::Memory(Memory::Workgroup), inner, offset, dynamic: Vec::new() };
@@ -264,8 +274,11 @@ impl<'a> Compiler<'a> {
     }
 
     fn count(&self, inner: &TypeInner) -> Result<u32> {
-        let count = scalar_count(self.module, inner);
-        count.ok_or_else(|| CompileError::Unsupported { construct: format!("a value of type {inner:?}") })
+        let type_name = || match inner.scalar() {
+            Some(scalar) => number_name(scalar),
+            None => format!("values of type {inner:?}"),
+        };
+        scalar_count(self.module, inner).map_or_else(|| unsupported(type_name()), Ok)
     }
 
     fn emit(&mut self, op: Op) {
@@ -413,6 +426,10 @@ impl<'a> Compiler<'a> {
         word_offsets(self.module, inner, 0, &mut offsets);
         offsets
     }
+}
+
+fn number_name(scalar: naga::Scalar) -> String {
+    format!("{}-bit numbers ({:?})", 8 * scalar.width, scalar.kind)
 }
 
 fn literal_bits(literal: naga::Literal) -> Result<u32> {
