@@ -66,13 +66,13 @@ pub(crate) enum Use {
     Read,
     Write,
     Atomic,
-    /// Atomic, and the value before does not matter.
+    AtomicLoad,
     AtomicStore,
 }
 
 impl Use {
     fn is_atomic(self) -> bool {
-        matches!(self, Self::Atomic | Self::AtomicStore)
+        matches!(self, Self::Atomic | Self::AtomicLoad | Self::AtomicStore)
     }
 }
 
@@ -119,12 +119,12 @@ impl Checker {
         let written_by_other = word.write_epoch == epoch && word.writer != invocation && !both_atomic;
         let read_by_other =
             word.read_epoch == epoch && (word.many_readers || word.reader != invocation) && usage != Use::Read;
-        let uninitialized = matches!(usage, Use::Read | Use::Atomic) && !word.written;
+        let uninitialized = usage != Use::Write && usage != Use::AtomicStore && !word.written;
         if usage == Use::Read {
             word.many_readers = word.read_epoch == epoch && (word.many_readers || word.reader != invocation);
             (word.read_epoch, word.reader) = (epoch, invocation);
         } else {
-            word.written = true;
+            word.written |= usage != Use::AtomicLoad;
             (word.write_epoch, word.writer, word.atomic) = (epoch, invocation, usage.is_atomic());
         }
         match (uninitialized, written_by_other || read_by_other) {

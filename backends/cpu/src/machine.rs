@@ -300,13 +300,16 @@ fn run<'a>(machine: &mut Machine<'a>) {
                 }
                 machine.store(memory, address, offset, a, mask);
             }
-            Op::Atomic { op, to, memory, address, offset, a, mask } => {
+            Op::Atomic { op: kind, memory, address, offset, mask, .. } => {
                 if machine.checker.is_some() {
-                    let stores = op == Atomic::Exchange && to.is_none();
-                    let usage = if stores { Use::AtomicStore } else { Use::Atomic };
+                    let usage = match kind {
+                        Atomic::Load => Use::AtomicLoad,
+                        Atomic::Store => Use::AtomicStore,
+                        _ => Use::Atomic,
+                    };
                     machine.check_memory(memory, address, offset, usage, mask);
                 }
-                machine.atomic(op, to, memory, address, offset, a, mask);
+                machine.atomic(op);
             }
             Op::ArrayLength { to, buffer, offset, stride } => {
                 let words = machine.buffer(buffer).map_or(0, |buffer| buffer.words.len() as u32);

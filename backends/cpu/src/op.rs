@@ -133,6 +133,8 @@ pub(crate) enum Binary {
 /// What an atomic operation does with the value in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Atomic {
+    Load,
+    Store,
     Add,
     Subtract,
     And,
@@ -242,11 +244,14 @@ pub(crate) enum Op {
     },
     Atomic {
         op: Atomic,
+        /// The value before.
         to: Option<u32>,
         memory: Memory,
         address: Operand,
         offset: u32,
         a: Operand,
+        /// The value that memory must hold for an exchange to happen.
+        compare: Option<Operand>,
         mask: Option<u32>,
     },
     /// Number of elements of a runtime-sized array.

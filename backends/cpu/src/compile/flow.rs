@@ -120,9 +120,9 @@ impl<'a> Compiler<'a> {
                 Ok(())
             }
             Statement::Atomic { pointer, fun, value, result } => {
-                let operand = self.atomic(frame, *pointer, *fun, *value, result.is_some())?;
-                if let (Some(handle), Some(operand)) = (result, operand) {
-                    self.define(frame, *handle, Value::Data(vec![operand]));
+                let operands = self.atomic(frame, *pointer, *fun, *value, result.is_some())?;
+                if let Some(handle) = result {
+                    self.define(frame, *handle, Value::Data(operands));
                     defined.push(*handle);
                 }
                 Ok(())

@@ -107,9 +107,10 @@ impl<'a> Compiler<'a> {
                 let address = self.address(place);
                 if let TypeInner::Atomic(_) = place.inner {
                     // atomicLoad
-                    let value = self.atomic_op(Atomic::Or, memory, address, place.offset, Operand::Const(0), true);
+                    let (to, a) = (self.registers.allocate(), Operand::Const(0));
+                    self.atomic_op(Atomic::Load, Some(to), place.offset, (memory, address), a, None);
                     self.release(&[address]);
-                    return Ok(value.into_iter().collect());
+                    return Ok(vec![Operand::Lane(to)]);
                 }
                 // Only constant buffers hold the same for all: others change while the kernel runs.
                 let uniform = self.is_constant(memory);
@@ -154,7 +155,7 @@ impl<'a> Compiler<'a> {
                 let address = self.address(place);
                 if let (TypeInner::Atomic(_), [a]) = (&place.inner, operands) {
                     // atomicStore
-                    self.atomic_op(Atomic::Exchange, memory, address, place.offset, *a, false);
+                    self.atomic_op(Atomic::Store, None, place.offset, (memory, address), *a, None);
                     self.release(&[address]);
                     return Ok(());
                 }
@@ -190,6 +191,7 @@ impl<'a> Compiler<'a> {
         Ok(())
     }
 
+    /// The value before, if it is wanted, and for a conditional exchange whether it happened.
     pub(super) fn atomic(
         &mut self,
         frame: &mut Inlined<'a>,
@@ -197,7 +199,7 @@ impl<'a> Compiler<'a> {
         function: AtomicFunction,
         value: Handle<Expression>,
         wanted: bool,
-    ) -> Result<Option<Operand>> {
+    ) -> Result<Vec<Operand>> {
         let place = self.place(frame, pointer)?;
         let Root::Memory(memory) = place.root else { return unsupported("an atomic variable of a function") };
         let signed = matches!(place.inner, TypeInner::Atomic(scalar) if scalar.kind == ScalarKind::Sint);
@@ -221,30 +223,36 @@ impl<'a> Compiler<'a> {
                     Atomic::MaxU
                 }
             }
-            AtomicFunction::Exchange { compare: None } => Atomic::Exchange,
-            AtomicFunction::Exchange { compare: Some(_) } => return unsupported("atomicCompareExchangeWeak"),
+            AtomicFunction::Exchange { .. } => Atomic::Exchange,
         };
         let a = self.data(frame, value)?[0];
+        let condition = if let AtomicFunction::Exchange { compare } = function { compare } else { None };
+        let compare = condition.map(|handle| self.data(frame, handle)).transpose()?.map(|operands| operands[0]);
         let address = self.address(&place);
-        let old = self.atomic_op(op, memory, address, place.offset, a, wanted);
+        let to = wanted.then(|| self.registers.allocate());
+        self.atomic_op(op, to, place.offset, (memory, address), a, compare);
         self.release(&[address]);
+        let mut results: Vec<_> = to.into_iter().map(Operand::Lane).collect();
+        if let (Some(compare), Some(&old)) = (compare, results.first()) {
+            results.push(self.binary(Binary::EqI, old, compare));
+        }
         self.used(frame, value);
-        Ok(old)
+        if let Some(handle) = condition {
+            self.used(frame, handle);
+        }
+        Ok(results)
     }
 
-    /// The value before, if it is wanted.
     fn atomic_op(
         &mut self,
         op: Atomic,
-        memory: Memory,
-        address: Operand,
+        to: Option<u32>,
         offset: u32,
+        (memory, address): (Memory, Operand),
         a: Operand,
-        wanted: bool,
-    ) -> Option<Operand> {
-        let to = wanted.then(|| self.registers.allocate());
-        self.emit(Op::Atomic { op, to, memory, address, offset, a, mask: self.mask });
-        to.map(Operand::Lane)
+        compare: Option<Operand>,
+    ) {
+        self.emit(Op::Atomic { op, to, memory, address, offset, a, compare, mask: self.mask });
     }
 
     pub(super) fn array_length(

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use naga::{Expression, Function, Handle};
+use naga::{AtomicFunction, Block, Expression, Function, Handle, Statement};
 
 /// The expressions that an expression is made of.
 pub(super) fn operands(expression: &Expression, mut visit: impl FnMut(Handle<Expression>)) {
@@ -30,20 +30,20 @@ pub(super) fn operands(expression: &Expression, mut visit: impl FnMut(Handle<Exp
     }
 }
 
-fn visit_statements(block: &naga::Block, visit: &mut impl FnMut(&naga::Statement)) {
+fn visit_statements(block: &Block, visit: &mut impl FnMut(&Statement)) {
     for statement in block {
         visit(statement);
         match statement {
-            naga::Statement::Block(inner) => visit_statements(inner, visit),
-            naga::Statement::If { accept, reject, .. } => {
+            Statement::Block(inner) => visit_statements(inner, visit),
+            Statement::If { accept, reject, .. } => {
                 visit_statements(accept, visit);
                 visit_statements(reject, visit);
             }
-            naga::Statement::Loop { body, continuing, .. } => {
+            Statement::Loop { body, continuing, .. } => {
                 visit_statements(body, visit);
                 visit_statements(continuing, visit);
             }
-            naga::Statement::Switch { cases, .. } => {
+            Statement::Switch { cases, .. } => {
                 cases.iter().for_each(|case| visit_statements(&case.body, visit));
             }
             _ => {}
@@ -51,23 +51,34 @@ fn visit_statements(block: &naga::Block, visit: &mut impl FnMut(&naga::Statement
     }
 }
 
+/// The expressions that a statement itself looks at.
+fn statement_operands(function: &Function, statement: &Statement, mut visit: impl FnMut(Handle<Expression>)) {
+    match statement {
+        Statement::Emit(range) => {
+            range.clone().for_each(|handle| operands(&function.expressions[handle], &mut visit));
+        }
+        Statement::If { condition, .. } => visit(*condition),
+        Statement::Switch { selector, .. } => visit(*selector),
+        Statement::Loop { break_if: Some(condition), .. } => visit(*condition),
+        Statement::Return { value: Some(value) } => visit(*value),
+        Statement::Store { pointer, value } => [*pointer, *value].into_iter().for_each(visit),
+        Statement::ImageStore { coordinate, value, .. } => [*coordinate, *value].into_iter().for_each(visit),
+        Statement::Atomic { pointer, value, fun, .. } => {
+            [*pointer, *value].into_iter().for_each(&mut visit);
+            if let AtomicFunction::Exchange { compare: Some(compare) } = fun {
+                visit(*compare);
+            }
+        }
+        Statement::Call { arguments, .. } => arguments.iter().copied().for_each(visit),
+        _ => {}
+    }
+}
+
 /// How often the value of each expression is asked for.
 pub(super) fn count_uses(function: &Function) -> Vec<u32> {
     let mut uses = vec![0; function.expressions.len()];
-    let mut count = |handle: Handle<Expression>| uses[handle.index()] += 1;
-    visit_statements(&function.body, &mut |statement| match statement {
-        naga::Statement::Emit(range) => {
-            range.clone().for_each(|handle| operands(&function.expressions[handle], &mut count));
-        }
-        naga::Statement::If { condition, .. } => count(*condition),
-        naga::Statement::Switch { selector, .. } => count(*selector),
-        naga::Statement::Loop { break_if: Some(condition), .. } => count(*condition),
-        naga::Statement::Return { value: Some(value) } => count(*value),
-        naga::Statement::Store { pointer, value } => [*pointer, *value].into_iter().for_each(&mut count),
-        naga::Statement::ImageStore { coordinate, value, .. } => [*coordinate, *value].into_iter().for_each(&mut count),
-        naga::Statement::Atomic { pointer, value, .. } => [*pointer, *value].into_iter().for_each(&mut count),
-        naga::Statement::Call { arguments, .. } => arguments.iter().copied().for_each(&mut count),
-        _ => {}
+    visit_statements(&function.body, &mut |statement| {
+        statement_operands(function, statement, |handle| uses[handle.index()] += 1);
     });
     uses
 }
@@ -93,18 +104,12 @@ pub(super) fn wanted_components(function: &Function) -> HashMap<Handle<Expressio
         }
     }
     visit_statements(&function.body, &mut |statement| {
-        let mut all = |handle: Handle<Expression>| {
-            if is_load(&handle) {
-                wanted.insert(handle, [true; 4]);
-            }
-        };
-        match statement {
-            naga::Statement::Return { value: Some(value) } => all(*value),
-            naga::Statement::Store { value, .. }
-            | naga::Statement::ImageStore { value, .. }
-            | naga::Statement::Atomic { value, .. } => all(*value),
-            naga::Statement::Call { arguments, .. } => arguments.iter().copied().for_each(all),
-            _ => {}
+        if !matches!(statement, Statement::Emit(_)) {
+            statement_operands(function, statement, |handle| {
+                if is_load(&handle) {
+                    wanted.insert(handle, [true; 4]);
+                }
+            });
         }
     });
     wanted

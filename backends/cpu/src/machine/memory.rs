@@ -67,12 +67,18 @@ impl<'a> Machine<'a> {
         }
     }
 
-    pub(super) fn atomic_word(op: Atomic, word: &AtomicU32, value: u32) -> u32 {
+    /// Changes a word; the value before.
+    fn atomic_word(op: Atomic, word: &AtomicU32, value: u32, compare: Option<u32>) -> u32 {
         let update = |function: &dyn Fn(u32) -> u32| {
             let result = word.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |old| Some(function(old)));
             result.unwrap_or_default()
         };
         match op {
+            Atomic::Load => word.load(Ordering::Relaxed),
+            Atomic::Store => {
+                word.store(value, Ordering::Relaxed);
+                0
+            }
             Atomic::Add => word.fetch_add(value, Ordering::Relaxed),
             Atomic::Subtract => word.fetch_sub(value, Ordering::Relaxed),
             Atomic::And => word.fetch_and(value, Ordering::Relaxed),
@@ -82,25 +88,23 @@ impl<'a> Machine<'a> {
             Atomic::MaxU => word.fetch_max(value, Ordering::Relaxed),
             Atomic::MinI => update(&|old| old.cast_signed().min(value.cast_signed()).cast_unsigned()),
             Atomic::MaxI => update(&|old| old.cast_signed().max(value.cast_signed()).cast_unsigned()),
-            Atomic::Exchange => word.swap(value, Ordering::Relaxed),
+            Atomic::Exchange => match compare {
+                None => word.swap(value, Ordering::Relaxed),
+                Some(compare) => word
+                    .compare_exchange(compare, value, Ordering::Relaxed, Ordering::Relaxed)
+                    .unwrap_or_else(|other| other),
+            },
         }
     }
 
-    #[expect(clippy::too_many_arguments, reason = "the fields of one instruction")]
-    pub(super) fn atomic(
-        &mut self,
-        op: Atomic,
-        to: Option<u32>,
-        memory: Memory,
-        address: Operand,
-        offset: u32,
-        a: Operand,
-        mask: Option<u32>,
-    ) {
+    pub(super) fn atomic(&mut self, operation: &Op) {
+        let Op::Atomic { op, to, memory, address, offset, a, compare, mask } = *operation else { return };
         for row in 0..self.rows {
             let (mask, addresses, values) = (self.mask_row(mask, row), self.row(address, row), self.row(a, row));
+            let compare = compare.map(|compare| self.row(compare, row));
             let mut old = [0; LANES];
             for i in 0..LANES {
+                let compare = compare.map(|compare| compare[i]);
                 if mask[i] == 0 {
                     continue;
                 }
@@ -109,13 +113,13 @@ impl<'a> Machine<'a> {
                     Memory::Workgroup => {
                         if let Some(word) = self.workgroup.get_mut(address) {
                             let cell = AtomicU32::new(*word);
-                            old[i] = Self::atomic_word(op, &cell, values[i]);
+                            old[i] = Self::atomic_word(op, &cell, values[i], compare);
                             *word = cell.into_inner();
                         }
                     }
                     Memory::Buffer(slot) => {
                         if let Some(word) = self.buffer(slot).and_then(|buffer| buffer.words.get(address)) {
-                            old[i] = Self::atomic_word(op, word, values[i]);
+                            old[i] = Self::atomic_word(op, word, values[i], compare);
                         }
                     }
                 }
