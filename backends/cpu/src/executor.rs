@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use crate::compile::{BindingSlot, Code, SlotKind, compile};
 use crate::machine::{Bound, Machine};
-use crate::{Buffer, CompileError, DispatchError, Fault, Texture};
+use crate::{Buffer, CompileError, DispatchError, Fault, Sampler, Texture};
 
 /// A resource for a binding of a kernel.
 #[derive(Debug, Clone, Copy)]
@@ -22,6 +22,11 @@ impl<'a> Binding<'a> {
     /// Binds a texture.
     pub fn texture(group: u32, binding: u32, texture: &'a Texture) -> Self {
         Self { group, binding, bound: Bound::Texture(texture) }
+    }
+
+    /// Binds a sampler.
+    pub fn sampler(group: u32, binding: u32, sampler: Sampler) -> Self {
+        Self { group, binding, bound: Bound::Sampler(sampler) }
     }
 }
 
@@ -53,6 +58,13 @@ impl Executor {
         match (given.map(|given| given.bound), kind) {
             (Some(bound @ Bound::Buffer(_)), SlotKind::Buffer { .. }) => Ok(bound),
             (Some(bound @ Bound::Texture(_)), SlotKind::Texture) => Ok(bound),
+            (Some(bound @ Bound::Sampler(sampler)), SlotKind::Sampler { comparison })
+                if sampler.compare.is_some() == *comparison =>
+            {
+                Ok(bound)
+            }
+            (_, SlotKind::Sampler { comparison: true }) => Err(fail("a sampler that compares")),
+            (_, SlotKind::Sampler { comparison: false }) => Err(fail("a sampler that does not compare")),
             (_, SlotKind::Buffer { .. }) => Err(fail("a buffer")),
             (_, SlotKind::Texture) => Err(fail("a texture")),
         }

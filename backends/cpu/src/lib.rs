@@ -38,12 +38,14 @@ mod math;
 mod op;
 mod registers;
 mod resource;
+mod sampler;
 
 pub use check::{Fault, FaultKind};
 pub use denoiser::{Denoiser, Inputs};
 pub use error::{CompileError, DispatchError, Error};
 pub use executor::{Binding, Executor};
 pub use resource::{Buffer, TexelFormat, Texture};
+pub use sampler::{AddressMode, BorderColor, Compare, Filter, Sampler};
 
 /// Invocations that one instruction works on at a time.
 pub(crate) const LANES: usize = 64;

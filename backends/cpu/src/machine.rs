@@ -1,6 +1,7 @@
 //! Runs compiled kernels, one workgroup at a time, every instruction for all of its invocations.
 
 mod memory;
+mod sample;
 mod texture;
 mod watch;
 
@@ -10,6 +11,7 @@ use crate::compile::Code;
 use crate::eval::{f, with_binary, with_unary};
 use crate::op::{Atomic, BuiltIn, Op, Operand};
 use crate::resource::{Buffer, Texture};
+use crate::sampler::Sampler;
 
 /// One register for a row of invocations.
 pub(crate) type Lanes = [u32; LANES];
@@ -19,6 +21,7 @@ pub(crate) type Lanes = [u32; LANES];
 pub(crate) enum Bound<'a> {
     Buffer(&'a Buffer),
     Texture(&'a Texture),
+    Sampler(Sampler),
 }
 
 pub(crate) struct Machine<'a> {
@@ -321,6 +324,7 @@ fn run<'a>(machine: &mut Machine<'a>) {
                 }
                 machine.texture_load(to, texture, x, y, level);
             }
+            Op::TextureSample(ref sample) => machine.sample(sample),
             Op::TextureStore { texture, x, y, texel, mask } => {
                 if machine.checker.is_some() {
                     let at = [x, y, Operand::Const(0)];

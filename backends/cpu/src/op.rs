@@ -166,6 +166,34 @@ pub(crate) enum BuiltIn {
     WorkgroupCount(u8),
 }
 
+/// Where the level of detail of a sample comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum SampleLod {
+    Exact(Operand),
+    /// Derivatives of both coordinates along `x`, then along `y`.
+    Gradient([Operand; 4]),
+}
+
+/// A texture looked up with a sampler.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sample {
+    /// The components that are wanted.
+    pub(crate) to: [Option<u32>; 4],
+    pub(crate) texture: u32,
+    pub(crate) sampler: u32,
+    pub(crate) at: [Operand; 2],
+    /// In texels.
+    pub(crate) offset: [i32; 2],
+    pub(crate) lod: SampleLod,
+    /// What texels are compared with.
+    pub(crate) reference: Option<Operand>,
+    /// The component of four texels that is wanted rather than a filtered value.
+    pub(crate) gather: Option<usize>,
+    /// Whether the coordinate stays half a texel inside.
+    pub(crate) clamp_to_edge: bool,
+    pub(crate) mask: Option<u32>,
+}
+
 /// One instruction. `mask` is a lane register with all ones for the invocations that take part; none means all.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Op {
@@ -271,6 +299,7 @@ pub(crate) enum Op {
         /// Only for checks.
         mask: Option<u32>,
     },
+    TextureSample(Box<Sample>),
     TextureStore {
         texture: u32,
         x: Operand,

@@ -230,6 +230,19 @@ impl Texture {
         [self.levels[0].width, self.levels[0].height]
     }
 
+    /// The components of the texel that begins at a word, as bits; those that the format lacks are 0, or 1 for alpha.
+    pub(crate) fn texel(&self, first_word: u32) -> [u32; 4] {
+        let channel = self.format.channel();
+        [0, 1, 2, 3].map(|component| {
+            if component >= self.format.components() {
+                return if component == 3 { channel.one() } else { 0 };
+            }
+            let (offset, shift) = self.format.position(component);
+            let word = self.words.get(first_word as usize + offset);
+            channel.decode(word.map_or(0, |word| word.load(Ordering::Relaxed)) >> shift)
+        })
+    }
+
     /// Replaces the first words, texel by texel and row by row, levels one after another.
     pub fn write(&mut self, words: impl IntoIterator<Item = u32>) {
         for (word, value) in self.words.iter_mut().zip(words) {

@@ -87,7 +87,7 @@ impl<'a> Compiler<'a> {
     pub(super) fn argument_value(&mut self, frame: &mut Inlined<'a>, handle: Handle<Expression>) -> Result<Value> {
         match self.inner(frame, handle) {
             TypeInner::Pointer { .. } | TypeInner::ValuePointer { .. } => Ok(Value::Place(self.place(frame, handle)?)),
-            TypeInner::Image { .. } => Ok(Value::Texture(self.texture(frame, handle)?)),
+            TypeInner::Image { .. } | TypeInner::Sampler { .. } => Ok(Value::Resource(self.resource(frame, handle)?)),
             _ => {
                 let operands = self.data(frame, handle)?;
                 self.retain(&operands);
@@ -180,40 +180,9 @@ impl<'a> Compiler<'a> {
                 }
                 self.load(&place)
             }
-            Expression::ImageLoad { image, coordinate, array_index: None, sample: None, level } => {
-                let texture = self.texture(frame, *image)?;
-                let at = self.data(frame, *coordinate)?;
-                let level = match level {
-                    Some(level) => self.data(frame, *level)?[0],
-                    None => Operand::Const(0),
-                };
-                let wanted = frame.wanted_components.get(&handle).copied().unwrap_or([false; 4]);
-                let to = wanted.map(|wanted| wanted.then(|| self.registers.allocate()));
-                let y = at.get(1).copied().unwrap_or(Operand::Const(0));
-                self.emit(Op::TextureLoad { to, texture, x: at[0], y, level, mask: self.mask });
-                let count = self.count(&self.inner(frame, handle))? as usize;
-                Ok(to[..count].iter().map(|to| to.map_or(Operand::Const(0), Operand::Lane)).collect())
-            }
-            Expression::ImageQuery { image, query } => {
-                let texture = self.texture(frame, *image)?;
-                match query {
-                    naga::ImageQuery::Size { level } => {
-                        let level = match level {
-                            Some(level) => self.data(frame, *level)?[0],
-                            None => Operand::Const(0),
-                        };
-                        let to = [self.result(&[level]), self.result(&[level])];
-                        self.emit(Op::TextureSize { to, texture, level });
-                        Ok(to.to_vec())
-                    }
-                    naga::ImageQuery::NumLevels => {
-                        let to = self.scalar();
-                        self.emit(Op::TextureLevels { to, texture });
-                        Ok(vec![to])
-                    }
-                    other => unsupported(format!("image query {other:?}")),
-                }
-            }
+            Expression::ImageLoad { .. } => self.image_load(frame, handle),
+            Expression::ImageSample { .. } => self.image_sample(frame, handle),
+            Expression::ImageQuery { image, query } => self.image_query(frame, *image, *query),
             Expression::Unary { op, expr } => {
                 let kind = self.kind(frame, *expr)?;
                 let op = match (op, kind) {

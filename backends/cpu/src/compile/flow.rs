@@ -108,7 +108,7 @@ impl<'a> Compiler<'a> {
                 Ok(())
             }
             Statement::ImageStore { image, coordinate, array_index: None, value } => {
-                let texture = self.texture(frame, *image)?;
+                let texture = self.resource(frame, *image)?;
                 let at = self.data(frame, *coordinate)?;
                 let texel = self.data(frame, *value)?;
                 let component = |i: usize| texel.get(i).copied().unwrap_or(Operand::Const(0));

@@ -7,18 +7,6 @@ use crate::layout::{element_count, part};
 use crate::op::{Atomic, Binary, Memory, Op, Operand};
 
 impl<'a> Compiler<'a> {
-    pub(super) fn texture(&mut self, frame: &Inlined<'a>, handle: Handle<Expression>) -> Result<u32> {
-        let value = match &frame.function.expressions[handle] {
-            Expression::GlobalVariable(global) => self.globals.get(global),
-            Expression::FunctionArgument(index) => frame.arguments.get(*index as usize),
-            _ => None,
-        };
-        match value {
-            Some(Value::Texture(texture)) => Ok(*texture),
-            _ => unsupported("a texture that is no global variable"),
-        }
-    }
-
     /// What a pointer points to.
     pub(super) fn place(&mut self, frame: &mut Inlined<'a>, handle: Handle<Expression>) -> Result<Place> {
         if let Some(Value::Place(place)) = &frame.values[handle.index()] {
@@ -27,7 +15,7 @@ impl<'a> Compiler<'a> {
         match &frame.function.expressions[handle] {
             Expression::GlobalVariable(global) => match self.globals.get(global) {
                 Some(Value::Place(place)) => Ok(place.clone()),
-                _ => unsupported("a pointer to a texture"),
+                _ => unsupported("a pointer to a texture or sampler"),
             },
             Expression::LocalVariable(local) => {
                 let inner = self.module.types[frame.function.local_variables[*local].ty].inner.clone();

@@ -8,6 +8,7 @@
 mod expression;
 mod flow;
 mod function;
+mod image;
 mod loops;
 mod math;
 mod memory;
@@ -37,6 +38,7 @@ pub(crate) struct BindingSlot {
 pub(crate) enum SlotKind {
     Buffer { writable: bool },
     Texture,
+    Sampler { comparison: bool },
 }
 
 /// A kernel ready to run.
@@ -91,7 +93,8 @@ struct Place {
 enum Value {
     Data(Vec<Operand>),
     Place(Place),
-    Texture(u32),
+    /// A texture or sampler, by its binding.
+    Resource(u32),
 }
 
 /// One function at one place that it is called from.
@@ -244,11 +247,17 @@ impl<'a> Compiler<'a> {
                 Ok(place(Root::Memory(Memory::Buffer(slot))))
             }
             AddressSpace::Handle => match inner {
-                TypeInner::Image { dim: naga::ImageDimension::D2, arrayed: false, .. } => {
+                TypeInner::Image { dim: naga::ImageDimension::D2, arrayed: false, class }
+                    if !class.is_multisampled() && class != naga::ImageClass::External =>
+                {
                     bind(SlotKind::Texture)?;
-                    Ok(Value::Texture(slot))
+                    Ok(Value::Resource(slot))
                 }
-                _ => unsupported(format!("`{name}`: a resource that is no two-dimensional texture")),
+                TypeInner::Sampler { comparison } => {
+                    bind(SlotKind::Sampler { comparison })?;
+                    Ok(Value::Resource(slot))
+                }
+                _ => unsupported(format!("`{name}`: a resource that is no plain two-dimensional texture")),
             },
             AddressSpace::WorkGroup => {
                 let mut layouter = naga::proc::Layouter::default();

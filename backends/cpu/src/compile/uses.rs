@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use naga::{AtomicFunction, Block, Expression, Function, Handle, Statement};
+use naga::{AtomicFunction, Block, Expression, Function, Handle, SampleLevel, Statement};
 
 /// The expressions that an expression is made of.
 pub(super) fn operands(expression: &Expression, mut visit: impl FnMut(Handle<Expression>)) {
@@ -16,6 +16,14 @@ pub(super) fn operands(expression: &Expression, mut visit: impl FnMut(Handle<Exp
         Expression::ImageLoad { coordinate, level, .. } => {
             visit(*coordinate);
             level.iter().copied().for_each(visit);
+        }
+        Expression::ImageSample { coordinate, offset, level, depth_ref, .. } => {
+            [Some(*coordinate), *offset, *depth_ref].into_iter().flatten().for_each(&mut visit);
+            match level {
+                SampleLevel::Exact(level) => visit(*level),
+                SampleLevel::Gradient { x, y } => [*x, *y].into_iter().for_each(visit),
+                SampleLevel::Auto | SampleLevel::Zero | SampleLevel::Bias(_) => {}
+            }
         }
         Expression::ImageQuery { query: naga::ImageQuery::Size { level: Some(level) }, .. } => visit(*level),
         Expression::Unary { expr, .. } | Expression::As { expr, .. } => visit(*expr),
@@ -86,7 +94,9 @@ pub(super) fn count_uses(function: &Function) -> Vec<u32> {
 /// Which components of each texel are looked at.
 pub(super) fn wanted_components(function: &Function) -> HashMap<Handle<Expression>, [bool; 4]> {
     let mut wanted: HashMap<_, [bool; 4]> = HashMap::new();
-    let is_load = |handle: &Handle<Expression>| matches!(function.expressions[*handle], Expression::ImageLoad { .. });
+    let is_load = |handle: &Handle<Expression>| {
+        matches!(function.expressions[*handle], Expression::ImageLoad { .. } | Expression::ImageSample { .. })
+    };
     for (_, expression) in function.expressions.iter() {
         match expression {
             Expression::AccessIndex { base, index } if is_load(base) => {
