@@ -23,6 +23,16 @@
 //! assert_eq!(f32::from_bits(numbers.read()[21]), 42.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! # Numbers
+//!
+//! `f32` arithmetic is that of IEEE 754, rounded to the nearest, denormals included; mathematical functions are made
+//! of it and give the same bits on every machine.
+//!
+//! `f16` values (`enable f16;`) are computed in `f32`: each operator, conversion and built-in function as a whole, such
+//! as `dot` or a product of matrices, rounds its result once to the nearest `f16`, ties to even. That is exactly
+//! IEEE 754 for `+`, `-`, `*`, `/`, `sqrt`, comparisons, conversions and rounding functions; `fma` and the others
+//! round twice. In naga 30 `frexp` of an `f16` gives a 16-bit exponent, which is not supported; its fraction is.
 
 #![forbid(unsafe_code)]
 

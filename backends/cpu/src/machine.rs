@@ -315,8 +315,8 @@ fn run<'a>(machine: &mut Machine<'a>) {
                 machine.atomic(op);
             }
             Op::ArrayLength { to, buffer, offset, stride } => {
-                let words = machine.buffer(buffer).map_or(0, |buffer| buffer.words.len() as u32);
-                machine.set_scalar(to, words.saturating_sub(offset) / stride);
+                let bytes = machine.buffer(buffer).map_or(0, |buffer| 4 * buffer.words.len() as u64);
+                machine.set_scalar(to, (bytes.saturating_sub(offset.into()) / u64::from(stride)) as u32);
             }
             Op::TextureLoad { to, texture, x, y, level, mask } => {
                 if machine.checker.is_some() {

@@ -147,13 +147,15 @@ pub(crate) enum Atomic {
     Exchange,
 }
 
-/// Memory with addresses, in words.
+/// Memory with addresses: in words, or in half words for half floats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Memory {
     /// Shared by the workgroup.
     Workgroup,
     /// A bound buffer, by its place among the program's bindings.
     Buffer(u32),
+    /// Half floats in a bound buffer. In registers they are floats.
+    Halves(u32),
 }
 
 /// A value with a name given by the API.
@@ -282,7 +284,7 @@ pub(crate) enum Op {
         compare: Option<Operand>,
         mask: Option<u32>,
     },
-    /// Number of elements of a runtime-sized array.
+    /// Number of elements of a runtime-sized array; offset and stride in bytes.
     ArrayLength {
         to: Operand,
         buffer: u32,

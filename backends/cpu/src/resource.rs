@@ -39,6 +39,21 @@ impl Buffer {
         self.words.get(address as usize).map_or(0, |word| word.load(Ordering::Relaxed))
     }
 
+    /// The half of a word at an address in halves.
+    pub(crate) fn get_half(&self, address: u32) -> u32 {
+        self.get(address / 2) >> (16 * (address % 2)) & 0xffff
+    }
+
+    /// Leaves the other half as it is, whoever writes it meanwhile.
+    pub(crate) fn set_half(&self, address: u32, half: u32) {
+        if let Some(word) = self.words.get(address as usize / 2) {
+            let shift = 16 * (address % 2);
+            let replaced = |old: u32| Some(old & !(0xffff << shift) | half << shift);
+            // The update never declines.
+            let _ = word.fetch_update(Ordering::Relaxed, Ordering::Relaxed, replaced);
+        }
+    }
+
     pub(crate) fn set(&self, address: u32, value: u32) {
         if let Some(word) = self.words.get(address as usize) {
             word.store(value, Ordering::Relaxed);

@@ -193,7 +193,10 @@ impl<'a> Compiler<'a> {
                 let values = self.data(frame, *expr)?;
                 Ok(values.into_iter().map(|value| self.unary(op, value)).collect())
             }
-            Expression::Binary { op, left, right } => self.binary_expression(frame, *op, *left, *right),
+            Expression::Binary { op, left, right } => {
+                let values = self.binary_expression(frame, *op, *left, *right)?;
+                Ok(self.rounded(frame, handle, values))
+            }
             Expression::Select { condition, accept, reject } => {
                 let condition = self.data(frame, *condition)?;
                 let accept = self.data(frame, *accept)?;
@@ -217,16 +220,15 @@ impl<'a> Compiler<'a> {
                 for handle in [Some(*arg), *arg1, *arg2, *arg3].into_iter().flatten() {
                     arguments.push(self.data(frame, handle)?);
                 }
-                self.math(*fun, kind, &inner, &arguments)
+                let values = self.math(*fun, kind, &inner, &arguments)?;
+                Ok(self.rounded(frame, handle, values))
             }
             Expression::As { expr, kind, convert } => {
                 let values = self.data(frame, *expr)?;
                 let from = self.kind(frame, *expr)?;
+                self.kind(frame, handle)?;
                 let op = match (from, kind, convert) {
                     (_, _, None) => Unary::Copy,
-                    (_, _, Some(width)) if !is_supported(naga::Scalar { kind: *kind, width: *width }) => {
-                        return unsupported(super::number_name(naga::Scalar { kind: *kind, width: *width }));
-                    }
                     (ScalarKind::Sint, ScalarKind::Float, _) => Unary::IntToFloat,
                     (ScalarKind::Uint, ScalarKind::Float, _) => Unary::UintToFloat,
                     (ScalarKind::Float, ScalarKind::Sint, _) => Unary::FloatToInt,
@@ -239,13 +241,27 @@ impl<'a> Compiler<'a> {
                 };
                 if op == Unary::Copy {
                     self.retain(&values);
-                    return Ok(values);
+                    return Ok(self.rounded(frame, handle, values));
                 }
-                Ok(values.into_iter().map(|value| self.unary(op, value)).collect())
+                let values = values.into_iter().map(|value| self.unary(op, value)).collect();
+                Ok(self.rounded(frame, handle, values))
             }
             Expression::ArrayLength(pointer) => self.array_length(frame, *pointer),
             other => unsupported(format!("expression {other:?}")),
         }
+    }
+
+    /// What arithmetic in single precision gave, rounded if it is to be half floats. Takes over the references.
+    fn rounded(&mut self, frame: &Inlined<'a>, handle: Handle<Expression>, values: Vec<Operand>) -> Vec<Operand> {
+        if self.inner(frame, handle).scalar() != Some(naga::Scalar::F16) {
+            return values;
+        }
+        let round = |value| {
+            let rounded = self.unary(Unary::QuantizeToF16, value);
+            self.release(&[value]);
+            rounded
+        };
+        values.into_iter().map(round).collect()
     }
 
     pub(super) fn reduce(&mut self, op: Binary, values: &[Operand]) -> Operand {

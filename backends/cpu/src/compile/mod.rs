@@ -21,7 +21,7 @@ use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{AddressSpace, Expression, Function, GlobalVariable, Handle, LocalVariable, Module, TypeInner};
 
 use crate::error::CompileError;
-use crate::layout::{scalar_count, word_offsets};
+use crate::layout::scalar_count;
 use crate::op::{Binary, Memory, Op, Operand, Unary};
 use crate::registers::Registers;
 
@@ -83,7 +83,7 @@ enum Root {
 struct Place {
     root: Root,
     inner: TypeInner,
-    /// From the root: scalars in a variable, words in memory.
+    /// From the root: bytes in a buffer, scalars elsewhere. Distances too.
     offset: u32,
     /// Index, distance between elements, and number of elements where it is known.
     dynamic: Vec<(Operand, u32, Option<u32>)>,
@@ -260,11 +260,8 @@ impl<'a> Compiler<'a> {
                 _ => unsupported(format!("`{name}`: a resource that is no plain two-dimensional texture")),
             },
             AddressSpace::WorkGroup => {
-                let mut layouter = naga::proc::Layouter::default();
-                let layouts = layouter.update(self.module.to_ctx());
-                layouts.or_else(|error| unsupported(format!("type of `{name}`: {error}")))?;
                 let offset = self.workgroup_words;
-                self.workgroup_words += layouter[variable.ty].size.div_ceil(4);
+                self.workgroup_words += self.count(&inner)?;
                 let place = Place { root: Root::Memory(Memory::Workgroup), inner, offset, dynamic: Vec::new() };
                 Ok(Value::Place(place))
             }
@@ -428,13 +425,6 @@ impl<'a> Compiler<'a> {
             other => unsupported(format!("constant expression {other:?}")),
         }
     }
-
-    /// Offsets of the scalars of a type in memory, in words.
-    fn offsets(&self, inner: &TypeInner) -> Vec<u32> {
-        let mut offsets = Vec::new();
-        word_offsets(self.module, inner, 0, &mut offsets);
-        offsets
-    }
 }
 
 fn number_name(scalar: naga::Scalar) -> String {
@@ -444,6 +434,7 @@ fn number_name(scalar: naga::Scalar) -> String {
 fn literal_bits(literal: naga::Literal) -> Result<u32> {
     match literal {
         naga::Literal::F32(value) => Ok(value.to_bits()),
+        naga::Literal::F16(value) => Ok(value.to_f32().to_bits()),
         naga::Literal::U32(value) => Ok(value),
         naga::Literal::I32(value) => Ok(value.cast_unsigned()),
         naga::Literal::Bool(value) => Ok(if value { u32::MAX } else { 0 }),

@@ -4,7 +4,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::{Bound, Machine};
 use crate::LANES;
-use crate::op::{Atomic, Memory, Op, Operand};
+use crate::eval::unary;
+use crate::op::{Atomic, Memory, Op, Operand, Unary};
 use crate::resource::Buffer;
 
 impl<'a> Machine<'a> {
@@ -22,6 +23,10 @@ impl<'a> Machine<'a> {
             match memory {
                 Memory::Workgroup => machine.workgroup.get(address as usize).copied().unwrap_or(0),
                 Memory::Buffer(slot) => machine.buffer(slot).map_or(0, |buffer| buffer.get(address)),
+                Memory::Halves(slot) => {
+                    let half = machine.buffer(slot).map_or(0, |buffer| buffer.get_half(address));
+                    unary(Unary::HalfToFloat, half)
+                }
             }
         };
         let Operand::Lane(register) = to else {
@@ -59,6 +64,11 @@ impl<'a> Machine<'a> {
                         Memory::Buffer(slot) => {
                             if let Some(buffer) = self.buffer(slot) {
                                 buffer.set(address, values[i]);
+                            }
+                        }
+                        Memory::Halves(slot) => {
+                            if let Some(buffer) = self.buffer(slot) {
+                                buffer.set_half(address, unary(Unary::ToHalf, values[i]));
                             }
                         }
                     }
@@ -117,7 +127,7 @@ impl<'a> Machine<'a> {
                             *word = cell.into_inner();
                         }
                     }
-                    Memory::Buffer(slot) => {
+                    Memory::Buffer(slot) | Memory::Halves(slot) => {
                         if let Some(word) = self.buffer(slot).and_then(|buffer| buffer.words.get(address)) {
                             old[i] = Self::atomic_word(op, word, values[i], compare);
                         }

@@ -39,7 +39,8 @@ impl Machine<'_> {
             let address = machine.row(address, row)[lane].wrapping_add(offset) as usize;
             match memory {
                 Memory::Workgroup => checker.workgroup_use(address, usage, (row * LANES + lane) as u32),
-                Memory::Buffer(slot) => {
+                Memory::Buffer(slot) | Memory::Halves(slot) => {
+                    let address = if let Memory::Halves(_) = memory { address / 2 } else { address };
                     let inside = machine.buffer(slot).is_some_and(|buffer| address < buffer.words.len());
                     let kind =
                         if usage == Use::Read { FaultKind::ReadOutOfBounds } else { FaultKind::WriteOutOfBounds };

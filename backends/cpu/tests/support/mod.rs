@@ -91,9 +91,9 @@ pub(crate) fn check(code: &str, expected: impl Fn(u32, u32) -> u32) {
             for (kind, selector) in [("varying", "(i * 7u + 3u) % 8u"), ("uniform", "numbers.y"), ("constant", "5u")] {
                 let call = surrounding.code;
                 let source = format!(
-                    "@group(0) @binding(0) var<storage, read_write> out: array<u32>;
+                    "{code}
+                    @group(0) @binding(0) var<storage, read_write> out: array<u32>;
                     @group(0) @binding(1) var<uniform> numbers: vec4<u32>;
-                    {code}
                     @compute @workgroup_size({size})
                     fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
                         let i = id.x;
