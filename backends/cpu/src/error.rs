@@ -8,6 +8,12 @@ pub enum CompileError {
         /// The name asked for.
         name: String,
     },
+    /// See [`Executor::with_subgroup_size`](crate::Executor::with_subgroup_size).
+    #[error("a subgroup of {size} invocations, expected 4, 8, 16, 32 or 64")]
+    SubgroupSize {
+        /// The size asked for.
+        size: u32,
+    },
     /// The kernel uses something that the executor does not know.
     #[error("the CPU executor does not support {construct}")]
     Unsupported {

@@ -46,6 +46,21 @@ impl Executor {
         Ok(Self { code: compile(module, info, entry_point)? })
     }
 
+    /// The same with subgroups of `size` invocations rather than [`SUBGROUP_SIZE`](crate::SUBGROUP_SIZE).
+    /// Invocations of a workgroup are in subgroups by their local index. What a subgroup operation reads from an
+    /// invocation that does not exist or does not take part is 0; sums and products go through invocations in order.
+    ///
+    /// # Errors
+    ///
+    /// [`CompileError::SubgroupSize`] for a size other than 4, 8, 16, 32 and 64.
+    pub fn with_subgroup_size(mut self, size: u32) -> Result<Self, CompileError> {
+        if ![4, 8, 16, 32, 64].contains(&size) {
+            return Err(CompileError::SubgroupSize { size });
+        }
+        self.code.subgroup_size = size;
+        Ok(self)
+    }
+
     /// Number of instructions.
     pub fn instruction_count(&self) -> usize {
         self.code.ops.len()

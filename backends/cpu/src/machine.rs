@@ -2,6 +2,7 @@
 
 mod memory;
 mod sample;
+mod subgroup;
 mod texture;
 mod watch;
 
@@ -209,6 +210,11 @@ impl<'a> Machine<'a> {
         match (to, value) {
             (to, BuiltIn::WorkgroupId(axis)) => self.set_scalar(to, self.group[axis as usize]),
             (to, BuiltIn::WorkgroupCount(axis)) => self.set_scalar(to, self.group_count[axis as usize]),
+            (to, BuiltIn::SubgroupSize) => self.set_scalar(to, self.code.subgroup_size),
+            (to, BuiltIn::SubgroupCount) => {
+                let invocations: u32 = size.iter().product();
+                self.set_scalar(to, invocations.div_ceil(self.code.subgroup_size));
+            }
             (Operand::Lane(register), value) => {
                 for row in 0..self.rows {
                     let to = self.at(register, row);
@@ -220,6 +226,8 @@ impl<'a> Machine<'a> {
                                 let axis = axis as usize;
                                 self.group[axis].wrapping_mul(size[axis]).wrapping_add(local(index)[axis])
                             }
+                            BuiltIn::SubgroupId => index / self.code.subgroup_size,
+                            BuiltIn::SubgroupLane => index % self.code.subgroup_size,
                             _ => index,
                         };
                     }
@@ -332,9 +340,10 @@ fn run<'a>(machine: &mut Machine<'a>) {
                 }
                 machine.texture_store(texture, x, y, texel, mask);
             }
-            Op::Barrier { mask } => {
+            Op::Subgroup { .. } => machine.subgroup(op),
+            Op::Barrier { mask, orders_workgroup } => {
                 if machine.checker.is_some() {
-                    machine.check_barrier(mask);
+                    machine.check_barrier(mask, orders_workgroup);
                 }
             }
             Op::TextureSize { to, texture, level } => {

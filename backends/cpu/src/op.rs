@@ -166,6 +166,39 @@ pub(crate) enum BuiltIn {
     GlobalId(u8),
     WorkgroupId(u8),
     WorkgroupCount(u8),
+    SubgroupSize,
+    SubgroupCount,
+    SubgroupId,
+    /// Index in the subgroup.
+    SubgroupLane,
+}
+
+/// How values of a subgroup become one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Fold {
+    pub(crate) op: Binary,
+    /// For no values.
+    pub(crate) identity: u32,
+    /// Whether each step rounds to half floats.
+    pub(crate) is_half: bool,
+}
+
+/// What the active invocations of a subgroup do together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Subgroup {
+    /// A word of the bits of those whose value is true.
+    Ballot(u8),
+    Reduce(Fold),
+    Inclusive(Fold),
+    Exclusive(Fold),
+    BroadcastFirst,
+    /// The value of the invocation at an index of the subgroup.
+    Shuffle,
+    ShuffleXor,
+    ShuffleUp,
+    ShuffleDown,
+    /// The value of the invocation at an index of each four.
+    QuadBroadcast,
 }
 
 /// Where the level of detail of a sample comes from.
@@ -318,9 +351,18 @@ pub(crate) enum Op {
         to: Operand,
         texture: u32,
     },
+    Subgroup {
+        op: Subgroup,
+        to: u32,
+        a: Operand,
+        index: Operand,
+        mask: Option<u32>,
+    },
     /// All invocations are always at the same instruction: only checks look at it.
     Barrier {
         mask: Option<u32>,
+        /// Whether it orders accesses to workgroup memory.
+        orders_workgroup: bool,
     },
     Jump {
         to: usize,

@@ -1,6 +1,6 @@
 //! Statements: control flow by jumps where it is uniform, by masks where it is not.
 
-use naga::{Block, Expression, Handle, Statement};
+use naga::{Barrier, Block, Expression, Handle, Statement};
 
 use super::{Compiler, Inlined, Result, Value, unsupported};
 use crate::op::{Binary, Op, Operand, Unary};
@@ -95,8 +95,28 @@ impl<'a> Compiler<'a> {
             Statement::Break => self.leave_loop(frame, true),
             Statement::Continue => self.leave_loop(frame, false),
             Statement::Return { value } => self.return_statement(frame, *value),
-            Statement::ControlBarrier(_) => {
-                self.emit(Op::Barrier { mask: self.mask });
+            // Orders no memory that others share.
+            Statement::ControlBarrier(Barrier::SUB_GROUP) => Ok(()),
+            Statement::ControlBarrier(barrier) => {
+                self.barrier(barrier.contains(Barrier::WORK_GROUP));
+                Ok(())
+            }
+            Statement::SubgroupBallot { result, predicate } => {
+                let operands = self.ballot(frame, *predicate)?;
+                self.define(frame, *result, Value::Data(operands));
+                defined.push(*result);
+                Ok(())
+            }
+            Statement::SubgroupCollectiveOperation { op, collective_op, argument, result } => {
+                let operands = self.collective(frame, *op, *collective_op, *argument)?;
+                self.define(frame, *result, Value::Data(operands));
+                defined.push(*result);
+                Ok(())
+            }
+            Statement::SubgroupGather { mode, argument, result } => {
+                let operands = self.gather(frame, *mode, *argument)?;
+                self.define(frame, *result, Value::Data(operands));
+                defined.push(*result);
                 Ok(())
             }
             Statement::MemoryBarrier(_) => Ok(()),
@@ -129,7 +149,9 @@ impl<'a> Compiler<'a> {
             }
             Statement::WorkGroupUniformLoad { pointer, result } => {
                 let place = self.place(frame, *pointer)?;
+                self.barrier(true);
                 let operands = self.load(&place)?;
+                self.barrier(true);
                 self.define(frame, *result, Value::Data(operands));
                 defined.push(*result);
                 Ok(())
@@ -154,6 +176,10 @@ impl<'a> Compiler<'a> {
             }
             other => unsupported(format!("statement {other:?}")),
         }
+    }
+
+    fn barrier(&mut self, orders_workgroup: bool) {
+        self.emit(Op::Barrier { mask: self.mask, orders_workgroup });
     }
 
     pub(super) fn if_statement(

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use naga::valid::FunctionInfo;
-use naga::{Block, Expression, Function, Handle, Statement};
+use naga::{Block, Expression, Function, Handle, Statement, TypeInner};
 
 use super::{Compiler, Inlined, Result, Value, unsupported};
 use crate::op::{Binary, BuiltIn, Op, Operand, Unary};
@@ -34,10 +34,19 @@ impl<'a> Compiler<'a> {
         }
         let mut arguments = Vec::new();
         for argument in &entry.function.arguments {
-            let Some(naga::Binding::BuiltIn(builtin)) = &argument.binding else {
-                return unsupported("entry point arguments that are no built-in values");
+            // One value, or a struct of them.
+            let bindings = match (&argument.binding, &self.module.types[argument.ty].inner) {
+                (None, TypeInner::Struct { members, .. }) => members.iter().map(|member| &member.binding).collect(),
+                (binding, _) => vec![binding],
             };
-            arguments.push(Value::Data(self.argument(*builtin)?));
+            let mut operands = Vec::new();
+            for binding in bindings {
+                let Some(naga::Binding::BuiltIn(builtin)) = binding else {
+                    return unsupported("entry point arguments that are no built-in values");
+                };
+                operands.extend(self.argument(*builtin)?);
+            }
+            arguments.push(Value::Data(operands));
         }
         self.inline(&entry.function, info, arguments)?;
         Ok(())
@@ -51,16 +60,20 @@ impl<'a> Compiler<'a> {
             naga::BuiltIn::WorkGroupId => vector(BuiltIn::WorkgroupId),
             naga::BuiltIn::NumWorkGroups => vector(BuiltIn::WorkgroupCount),
             naga::BuiltIn::LocalInvocationIndex => vec![self.builtin(BuiltIn::LocalIndex)],
+            naga::BuiltIn::SubgroupSize => vec![self.builtin(BuiltIn::SubgroupSize)],
+            naga::BuiltIn::NumSubgroups => vec![self.builtin(BuiltIn::SubgroupCount)],
+            naga::BuiltIn::SubgroupId => vec![self.builtin(BuiltIn::SubgroupId)],
+            naga::BuiltIn::SubgroupInvocationId => vec![self.builtin(BuiltIn::SubgroupLane)],
             other => return unsupported(format!("built-in value {other:?}")),
         })
     }
 
     fn builtin(&mut self, value: BuiltIn) -> Operand {
         let to = match value {
-            BuiltIn::WorkgroupId(_) | BuiltIn::WorkgroupCount(_) => self.scalar(),
-            BuiltIn::LocalId(_) | BuiltIn::GlobalId(_) | BuiltIn::LocalIndex => {
-                Operand::Lane(self.registers.allocate())
+            BuiltIn::WorkgroupId(_) | BuiltIn::WorkgroupCount(_) | BuiltIn::SubgroupSize | BuiltIn::SubgroupCount => {
+                self.scalar()
             }
+            _ => Operand::Lane(self.registers.allocate()),
         };
         self.emit(Op::BuiltIn { to, value });
         to

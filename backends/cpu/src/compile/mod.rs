@@ -13,6 +13,7 @@ mod loops;
 mod math;
 mod memory;
 mod packing;
+mod subgroup;
 mod uses;
 
 use std::collections::{HashMap, HashSet};
@@ -52,6 +53,8 @@ pub(crate) struct Code {
     pub(crate) tables: Vec<Vec<u32>>,
     pub(crate) workgroup_words: u32,
     pub(crate) workgroup_size: [u32; 3],
+    /// A divisor of `LANES`.
+    pub(crate) subgroup_size: u32,
     pub(crate) bindings: Vec<BindingSlot>,
 }
 
@@ -186,6 +189,7 @@ pub(crate) fn compile(module: &Module, info: &ModuleInfo, entry_point: &str) -> 
                 tables: compiler.tables,
                 workgroup_words: compiler.workgroup_words,
                 workgroup_size: entry.workgroup_size,
+                subgroup_size: crate::SUBGROUP_SIZE,
                 bindings: compiler.bindings,
             });
         }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use naga::{AtomicFunction, Block, Expression, Function, Handle, SampleLevel, Statement};
+use naga::{AtomicFunction, Block, Expression, Function, GatherMode, Handle, SampleLevel, Statement};
 
 /// The expressions that an expression is made of.
 pub(super) fn operands(expression: &Expression, mut visit: impl FnMut(Handle<Expression>)) {
@@ -75,6 +75,20 @@ fn statement_operands(function: &Function, statement: &Statement, mut visit: imp
             [*pointer, *value].into_iter().for_each(&mut visit);
             if let AtomicFunction::Exchange { compare: Some(compare) } = fun {
                 visit(*compare);
+            }
+        }
+        Statement::SubgroupBallot { predicate, .. } => predicate.iter().copied().for_each(visit),
+        Statement::SubgroupCollectiveOperation { argument, .. } => visit(*argument),
+        Statement::SubgroupGather { mode, argument, .. } => {
+            visit(*argument);
+            match mode {
+                GatherMode::BroadcastFirst | GatherMode::QuadSwap(_) => {}
+                GatherMode::Broadcast(index)
+                | GatherMode::Shuffle(index)
+                | GatherMode::ShuffleDown(index)
+                | GatherMode::ShuffleUp(index)
+                | GatherMode::ShuffleXor(index)
+                | GatherMode::QuadBroadcast(index) => visit(*index),
             }
         }
         Statement::Call { arguments, .. } => arguments.iter().copied().for_each(visit),

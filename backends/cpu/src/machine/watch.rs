@@ -61,10 +61,10 @@ impl Machine<'_> {
     }
 
     #[cold]
-    pub(super) fn check_barrier(&mut self, mask: Option<u32>) {
+    pub(super) fn check_barrier(&mut self, mask: Option<u32>, orders_workgroup: bool) {
         let masks: Vec<Lanes> = (0..self.rows).map(|row| self.mask_row(mask, row)).collect();
         self.check(None, |_, _, row, lane| (masks[row][lane] == 0).then_some(FaultKind::DivergentBarrier));
-        if let Some(checker) = &mut self.checker {
+        if let (Some(checker), true) = (&mut self.checker, orders_workgroup) {
             checker.barrier();
         }
     }

@@ -8,7 +8,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use limpid_cpu::{Binding, Buffer, CompileError, Executor};
-use naga::valid::{Capabilities, ValidationFlags, Validator};
+use naga::valid::{Capabilities, ShaderStages, SubgroupOperationSet, ValidationFlags, Validator};
 
 /// What buffers hold before a kernel runs.
 pub(crate) const UNTOUCHED: u32 = 0xdead_beef;
@@ -20,6 +20,7 @@ pub(crate) fn compile(source: &str, entry_point: &str) -> Result<Executor, Compi
     let module =
         naga::front::wgsl::parse_str(source).unwrap_or_else(|error| panic!("{}", error.emit_to_string(source)));
     let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
+    validator.subgroup_stages(ShaderStages::COMPUTE).subgroup_operations(SubgroupOperationSet::all());
     let info = validator.validate(&module).unwrap_or_else(|error| panic!("{}", error.emit_to_string(source)));
     Executor::new(&module, &info, entry_point)
 }
