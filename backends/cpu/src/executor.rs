@@ -72,7 +72,7 @@ impl Executor {
         let fail = |expected| DispatchError::Binding { name: name.clone(), group: *group, binding: *binding, expected };
         match (given.map(|given| given.bound), kind) {
             (Some(bound @ Bound::Buffer(_)), SlotKind::Buffer { .. }) => Ok(bound),
-            (Some(bound @ Bound::Texture(_)), SlotKind::Texture) => Ok(bound),
+            (Some(bound @ Bound::Texture(_)), SlotKind::Texture { .. }) => Ok(bound),
             (Some(bound @ Bound::Sampler(sampler)), SlotKind::Sampler { comparison })
                 if sampler.compare.is_some() == *comparison =>
             {
@@ -81,7 +81,7 @@ impl Executor {
             (_, SlotKind::Sampler { comparison: true }) => Err(fail("a sampler that compares")),
             (_, SlotKind::Sampler { comparison: false }) => Err(fail("a sampler that does not compare")),
             (_, SlotKind::Buffer { .. }) => Err(fail("a buffer")),
-            (_, SlotKind::Texture) => Err(fail("a texture")),
+            (_, SlotKind::Texture { .. }) => Err(fail("a texture")),
         }
     }
 
@@ -100,8 +100,8 @@ impl Executor {
     }
 
     /// Runs `groups` workgroups one after another and watches what they do: uninitialised or racy use of
-    /// workgroup memory, accesses out of bounds, barriers that not all reach. Results are those of
-    /// [`dispatch`](Self::dispatch). Races between workgroups are not seen.
+    /// workgroup memory, races between workgroups, accesses out of bounds, barriers that not all reach. Results are
+    /// those of [`dispatch`](Self::dispatch). Races for buffers inside a workgroup are not seen.
     ///
     /// # Errors
     ///

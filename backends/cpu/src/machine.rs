@@ -7,7 +7,7 @@ mod texture;
 mod watch;
 
 use crate::LANES;
-use crate::check::{Checker, Fault, FaultKind, Use};
+use crate::check::{Checker, Fault, Shared, Use};
 use crate::compile::Code;
 use crate::eval::{f, with_binary, with_unary};
 use crate::op::{Atomic, BuiltIn, Op, Operand};
@@ -40,6 +40,22 @@ pub(crate) struct Machine<'a> {
     checker: Option<Checker>,
 }
 
+/// For each binding the first one with the same resource, if the kernel can write that.
+fn written_resources(code: &Code, bound: &[Bound<'_>]) -> Vec<Option<u32>> {
+    let same = |a: &Bound<'_>, b: &Bound<'_>| match (a, b) {
+        (Bound::Buffer(a), Bound::Buffer(b)) => std::ptr::eq(*a, *b),
+        (Bound::Texture(a), Bound::Texture(b)) => std::ptr::eq(*a, *b),
+        _ => false,
+    };
+    let resource = |one: &Bound<'_>| {
+        let mut bindings = bound.iter().zip(&code.bindings);
+        let is_written = bindings.any(|(other, slot)| same(one, other) && slot.kind.is_writable());
+        let first = bound.iter().position(|other| same(one, other));
+        first.filter(|_| is_written).map(|first| first as u32)
+    };
+    bound.iter().map(resource).collect()
+}
+
 impl<'a> Machine<'a> {
     pub(crate) fn new(code: &'a Code, bound: &'a [Bound<'a>], group_count: [u32; 3]) -> Self {
         let invocations: u32 = code.workgroup_size.iter().product();
@@ -60,7 +76,8 @@ impl<'a> Machine<'a> {
 
     /// A machine that watches what kernels do.
     pub(crate) fn checked(code: &'a Code, bound: &'a [Bound<'a>], group_count: [u32; 3]) -> Self {
-        Self { checker: Some(Checker::default()), ..Self::new(code, bound, group_count) }
+        let checker = Checker::new(group_count, Shared::new(written_resources(code, bound)));
+        Self { checker: Some(checker), ..Self::new(code, bound, group_count) }
     }
 
     pub(crate) fn into_faults(self) -> Vec<Fault> {
@@ -328,7 +345,7 @@ fn run<'a>(machine: &mut Machine<'a>) {
             }
             Op::TextureLoad { to, texture, x, y, level, mask } => {
                 if machine.checker.is_some() {
-                    machine.check_texture(texture, [x, y, level], mask, FaultKind::ReadOutOfBounds);
+                    machine.check_texture(texture, [x, y, level], Use::Read, mask);
                 }
                 machine.texture_load(to, texture, x, y, level);
             }
@@ -336,7 +353,7 @@ fn run<'a>(machine: &mut Machine<'a>) {
             Op::TextureStore { texture, x, y, texel, mask } => {
                 if machine.checker.is_some() {
                     let at = [x, y, Operand::Const(0)];
-                    machine.check_texture(texture, at, mask, FaultKind::WriteOutOfBounds);
+                    machine.check_texture(texture, at, Use::Write, mask);
                 }
                 machine.texture_store(texture, x, y, texel, mask);
             }

@@ -245,6 +245,11 @@ impl Texture {
         [self.levels[0].width, self.levels[0].height]
     }
 
+    /// Where a texel inside of a level begins, in words.
+    pub(crate) fn first_word(&self, level: &Level, x: u32, y: u32) -> u32 {
+        level.first_word + (y * level.width + x) * self.format.words() as u32
+    }
+
     /// The components of the texel that begins at a word, as bits; those that the format lacks are 0, or 1 for alpha.
     pub(crate) fn texel(&self, first_word: u32) -> [u32; 4] {
         let channel = self.format.channel();

@@ -240,7 +240,7 @@ impl Sampling<'_> {
             let border = [color, color, color, alpha];
             return [0, 1, 2, 3].map(|i| if i < format.components() { border[i] } else { missing[i] });
         };
-        let first = level.first_word + (y * level.width + x) * format.words() as u32;
+        let first = self.texture.first_word(level, x, y);
         self.reads.push(first);
         self.texture.texel(first)
     }

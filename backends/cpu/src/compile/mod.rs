@@ -38,8 +38,14 @@ pub(crate) struct BindingSlot {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SlotKind {
     Buffer { writable: bool },
-    Texture,
+    Texture { writable: bool },
     Sampler { comparison: bool },
+}
+
+impl SlotKind {
+    pub(crate) fn is_writable(self) -> bool {
+        matches!(self, Self::Buffer { writable: true } | Self::Texture { writable: true })
+    }
 }
 
 /// A kernel ready to run.
@@ -254,7 +260,9 @@ impl<'a> Compiler<'a> {
                 TypeInner::Image { dim: naga::ImageDimension::D2, arrayed: false, class }
                     if !class.is_multisampled() && class != naga::ImageClass::External =>
                 {
-                    bind(SlotKind::Texture)?;
+                    let can_store = |access: naga::StorageAccess| access.contains(naga::StorageAccess::STORE);
+                    let writable = matches!(class, naga::ImageClass::Storage { access, .. } if can_store(access));
+                    bind(SlotKind::Texture { writable })?;
                     Ok(Value::Resource(slot))
                 }
                 TypeInner::Sampler { comparison } => {

@@ -43,6 +43,9 @@ impl Machine<'_> {
                         sampling.sample(Lod::Gradient([dx, dy])).map(f32::to_bits)
                     }
                 };
+                if self.checker.as_ref().is_some_and(|checker| checker.is_written(op.texture)) {
+                    self.check_reads(op.texture, &reads, row * LANES + i);
+                }
                 for (values, component) in texels.iter_mut().zip(texel) {
                     values[i] = component;
                 }

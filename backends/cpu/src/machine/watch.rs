@@ -2,7 +2,7 @@
 
 use super::{Lanes, Machine};
 use crate::LANES;
-use crate::check::{Checker, FaultKind, Use};
+use crate::check::{Checker, FaultKind, Found, Use};
 use crate::op::{Memory, Operand};
 
 impl Machine<'_> {
@@ -10,7 +10,7 @@ impl Machine<'_> {
     pub(super) fn check(
         &mut self,
         mask: Option<u32>,
-        check: impl Fn(&mut Checker, &Self, usize, usize) -> Option<FaultKind>,
+        check: impl Fn(&mut Checker, &Self, usize, usize) -> Option<Found>,
     ) {
         let Some(mut checker) = self.checker.take() else { return };
         let invocations = self.code.workgroup_size.iter().product::<u32>() as usize;
@@ -19,8 +19,8 @@ impl Machine<'_> {
             if self.mask_row(mask, row)[lane] == 0 {
                 continue;
             }
-            if let Some(kind) = check(&mut checker, self, row, lane) {
-                checker.fault(self.current, self.code.spans[self.current], kind, index as u32);
+            if let Some(found) = check(&mut checker, self, row, lane) {
+                checker.fault(self.current, self.code.spans[self.current], found, index as u32);
             }
         }
         self.checker = Some(checker);
@@ -37,33 +37,50 @@ impl Machine<'_> {
     ) {
         self.check(mask, |checker, machine, row, lane| {
             let address = machine.row(address, row)[lane].wrapping_add(offset) as usize;
-            match memory {
-                Memory::Workgroup => checker.workgroup_use(address, usage, (row * LANES + lane) as u32),
-                Memory::Buffer(slot) | Memory::Halves(slot) => {
-                    let address = if let Memory::Halves(_) = memory { address / 2 } else { address };
-                    let inside = machine.buffer(slot).is_some_and(|buffer| address < buffer.words.len());
-                    let kind =
-                        if usage == Use::Read { FaultKind::ReadOutOfBounds } else { FaultKind::WriteOutOfBounds };
-                    (!inside).then_some(kind)
+            let (binding, word) = match memory {
+                Memory::Workgroup => {
+                    let kind = checker.workgroup_use(address, usage, (row * LANES + lane) as u32);
+                    return kind.map(Found::from);
                 }
+                Memory::Buffer(binding) => (binding, address),
+                Memory::Halves(binding) => (binding, address / 2),
+            };
+            if machine.buffer(binding).is_none_or(|buffer| word >= buffer.words.len()) {
+                return Some(usage.out_of_bounds().into());
             }
+            let location = if let Memory::Halves(_) = memory { address } else { 2 * address };
+            checker.shared_use(binding, location as u32, usage)
         });
     }
 
     #[cold]
-    pub(super) fn check_texture(&mut self, texture: u32, at: [Operand; 3], mask: Option<u32>, kind: FaultKind) {
-        let Some(texture) = self.texture(texture) else { return };
-        self.check(mask, |_, machine, row, lane| {
+    pub(super) fn check_texture(&mut self, binding: u32, at: [Operand; 3], usage: Use, mask: Option<u32>) {
+        let Some(texture) = self.texture(binding) else { return };
+        self.check(mask, |checker, machine, row, lane| {
             let [x, y, level] = at.map(|operand| machine.row(operand, row)[lane]);
             let level = texture.levels.get(level as usize);
-            level.is_none_or(|level| x >= level.width || y >= level.height).then_some(kind)
+            match level.filter(|level| x < level.width && y < level.height) {
+                Some(level) => checker.shared_use(binding, texture.first_word(level, x, y), usage),
+                None => Some(usage.out_of_bounds().into()),
+            }
         });
+    }
+
+    /// For texels that a sampler read.
+    #[cold]
+    pub(super) fn check_reads(&mut self, binding: u32, texels: &[u32], invocation: usize) {
+        let Some(checker) = &mut self.checker else { return };
+        for &texel in texels {
+            if let Some(found) = checker.shared_use(binding, texel, Use::Read) {
+                checker.fault(self.current, self.code.spans[self.current], found, invocation as u32);
+            }
+        }
     }
 
     #[cold]
     pub(super) fn check_barrier(&mut self, mask: Option<u32>, orders_workgroup: bool) {
         let masks: Vec<Lanes> = (0..self.rows).map(|row| self.mask_row(mask, row)).collect();
-        self.check(None, |_, _, row, lane| (masks[row][lane] == 0).then_some(FaultKind::DivergentBarrier));
+        self.check(None, |_, _, row, lane| (masks[row][lane] == 0).then_some(FaultKind::DivergentBarrier.into()));
         if let (Some(checker), true) = (&mut self.checker, orders_workgroup) {
             checker.barrier();
         }
