@@ -261,7 +261,7 @@ fn constant_buffers_workgroup_memory_and_variables_of_halves() {
         }";
     let half = |number: f32| f16::from_f32(number).to_bits();
     // In halves: list 0..8, scale 8, offset 10..12, m 12..20.
-    let mut numbers = vec![0u16; 24];
+    let mut numbers = [0u16; 24];
     (numbers[8], numbers[10], numbers[11]) = (half(3.0), half(-1.0), half(4.0));
     (12..20).for_each(|i| numbers[i] = half(i as f32 / 8.0));
     let words = numbers.chunks(2).map(|pair| pack(pair[0], pair[1])).collect::<Vec<_>>();
@@ -307,7 +307,7 @@ fn halves_in_functions_and_divergent_flow() {
         let sum: f32 = (0..=u).map(|k| k as f32 + value(i + k)).sum();
         let quarter = if i.is_multiple_of(2) { (i % 16) as f32 * 0.25 } else { 0.0 };
         let exponent = 32 - (u + 1).leading_zeros();
-        let fraction = 16 * (u + 1) >> exponent;
+        let fraction = (16 * (u + 1)) >> exponent;
         let bits = |x: f32| f16::from_f32(x).to_bits();
         pack(bits(sum), bits(quarter.fract())) + fraction + quarter.trunc() as u32
     };

@@ -29,7 +29,7 @@ const EXPRESSIONS: [(&str, bool); 16] = [
 
 #[test]
 fn arithmetic_agrees() {
-    let Some(gpu) = Gpu::with_features(wgpu::Features::SHADER_F16) else { return };
+    let Some(gpu) = Gpu::open(wgpu::Features::SHADER_F16) else { return };
     let count = EXPRESSIONS.len();
     let lines: String =
         (0..).zip(EXPRESSIONS).map(|(i, (e, _))| format!("out[id.x * {count}u + {i}u] = {e};\n")).collect();

@@ -140,7 +140,7 @@ fn samplers() -> impl Iterator<Item = Sampler> {
 
 #[test]
 fn samples_agree_within_the_weights_of_a_device() {
-    let Some(gpu) = Gpu::open() else { return };
+    let Some(gpu) = Gpu::open(wgpu::Features::empty()) else { return };
     for sampler in samplers() {
         check(&gpu, "textureSampleLevel(image, s, p.xy, p.z)", false, sampler);
         check(&gpu, "textureSampleLevel(image, s, p.xy, p.z, vec2(2, -1))", false, sampler);
@@ -151,7 +151,7 @@ fn samples_agree_within_the_weights_of_a_device() {
 
 #[test]
 fn depth_comparisons_agree() {
-    let Some(gpu) = Gpu::open() else { return };
+    let Some(gpu) = Gpu::open(wgpu::Features::empty()) else { return };
     for sampler in samplers() {
         for compare in [Compare::Less, Compare::GreaterEqual] {
             let sampler = Sampler { compare: Some(compare), ..sampler };

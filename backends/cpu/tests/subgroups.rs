@@ -60,7 +60,7 @@ const OPERATIONS: [Operation; 34] = [
     ("subgroupAdd(vec2(v, v * 2u)).y", |v, _| active(v).sum::<u32>() * 2),
     ("subgroupBallot(v % 3u == 0u).x", |v, _| {
         (0..32).fold(0, |bits, lane| {
-            bits | u32::from(at(v, lane) % 3 == 0 && v.get(lane).is_some_and(Option::is_some)) << lane
+            bits | u32::from(at(v, lane).is_multiple_of(3) && v.get(lane).is_some_and(Option::is_some)) << lane
         })
     }),
     ("subgroupBallot().y", |v, _| {

@@ -26,7 +26,7 @@ const INDEPENDENT: [&str; 14] = [
 
 #[test]
 fn what_does_not_depend_on_the_size_of_subgroups_agrees() {
-    let Some(gpu) = Gpu::with_features(wgpu::Features::SUBGROUP) else { return };
+    let Some(gpu) = Gpu::open(wgpu::Features::SUBGROUP) else { return };
     let count = INDEPENDENT.len() + 1;
     let lines: String = (0..).zip(INDEPENDENT).map(|(i, e)| format!("out[id.x * {count}u + {i}u] = {e};\n")).collect();
     let source = format!(

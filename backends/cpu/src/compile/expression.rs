@@ -57,7 +57,7 @@ impl<'a> Compiler<'a> {
         }
         let constants = |bits: Vec<u32>| bits.into_iter().map(Operand::Const).collect();
         match &frame.function.expressions[handle] {
-            Expression::Literal(literal) => Ok(vec![Operand::Const(super::literal_bits(*literal)?)]),
+            Expression::Literal(literal) => Ok(vec![Operand::Const(super::globals::literal_bits(*literal)?)]),
             Expression::Constant(constant) => self.constant(self.module.constants[*constant].init).map(constants),
             Expression::ZeroValue(ty) => {
                 let count = self.count(&self.module.types[*ty].inner.clone())?;

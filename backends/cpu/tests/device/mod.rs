@@ -1,5 +1,7 @@
 //! A device that runs compute kernels.
 
+#![allow(dead_code, reason = "each test file uses a part of it")]
+
 use std::io::Write;
 use wgpu::util::DeviceExt;
 
@@ -9,13 +11,8 @@ pub(crate) struct Gpu {
 }
 
 impl Gpu {
-    /// `None`, with the reason on stderr, where there is no device with default limits.
-    pub(crate) fn open() -> Option<Self> {
-        Self::with_features(wgpu::Features::empty())
-    }
-
-    /// The same for a device that must offer something.
-    pub(crate) fn with_features(required_features: wgpu::Features) -> Option<Self> {
+    /// `None`, with the reason on stderr, where there is no device with default limits and these features.
+    pub(crate) fn open(required_features: wgpu::Features) -> Option<Self> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         let opened = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))
             .map_err(|error| error.to_string())
