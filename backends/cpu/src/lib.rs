@@ -32,7 +32,8 @@
 //! `f16` values (`enable f16;`) are computed in `f32`: each operator, conversion and built-in function as a whole, such
 //! as `dot` or a product of matrices, rounds its result once to the nearest `f16`, ties to even. That is exactly
 //! IEEE 754 for `+`, `-`, `*`, `/`, `sqrt`, comparisons, conversions and rounding functions; `fma` and the others
-//! may differ from it in the last place. In naga 30 `frexp` of an `f16` gives a 16-bit exponent, which is not supported; its fraction is.
+//! may differ from it in the last place. In naga 30 `frexp` of an `f16` gives a 16-bit exponent, which is not
+//! supported; its fraction is.
 //!
 //! # Subgroups
 //!

@@ -209,7 +209,7 @@ pub(crate) struct Level {
     pub(crate) height: u32,
 }
 
-/// A two-dimensional texture.
+/// A two-dimensional texture. A depth texture of a kernel looks at its first component.
 #[derive(Debug)]
 pub struct Texture {
     format: TexelFormat,
@@ -228,7 +228,7 @@ impl Texture {
         let mut levels = Vec::new();
         let mut count = 0;
         for level in 0..level_count.max(1) {
-            let (width, height) = ((width >> level).max(1), (height >> level).max(1));
+            let [width, height] = [width, height].map(|size| size.checked_shr(level).unwrap_or(0).max(1));
             levels.push(Level { first_word: count as u32, width, height });
             count += width as usize * height as usize * format.words();
         }

@@ -256,8 +256,8 @@ impl Sampling<'_> {
         }
     }
 
-    /// A component, or what comparisons give, of the four texels that a linear filter blends: as bits, counter-clockwise
-    /// from the one at lower `x` and greater `y`.
+    /// A component, or what comparisons give, of the four texels that a linear filter blends: as bits,
+    /// counter-clockwise from the one at lower `x` and greater `y`.
     pub(crate) fn gather(&mut self, component: usize) -> [u32; 4] {
         let level = self.texture.levels[0];
         let [x, y] = self.footprint(&level, Filter::Linear);

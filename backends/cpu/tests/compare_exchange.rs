@@ -32,7 +32,8 @@ proptest! {
     fn memory_changes_only_where_it_holds_what_was_expected(
         triples in proptest::collection::vec((any::<u32>(), any::<u32>(), any::<u32>(), any::<bool>()), 100),
     ) {
-        let triples: Vec<_> = triples.into_iter().map(|(old, other, new, same)| (old, if same { old } else { other }, new)).collect();
+        let triple = |(old, other, new, same)| (old, if same { old } else { other }, new);
+        let triples: Vec<_> = triples.into_iter().map(triple).collect();
         for ty in ["u32", "i32"] {
             for in_workgroup in [false, true] {
                 for checked in [false, true] {

@@ -183,7 +183,8 @@ proptest! {
         ];
         let found = executor(source).dispatch_checked([2, 2, 1], &bindings).unwrap();
         let kinds = [Access::Read, Access::Write, Access::AtomicLoad, Access::AtomicAdd];
-        let of_group = |group: usize| accesses[4 * group..4 * group + 4].iter().map(|(kind, address)| (kinds[*kind as usize], *address));
+        let named = |(kind, address): &(u32, u32)| (kinds[*kind as usize], *address);
+        let of_group = |group: usize| accesses[4 * group..4 * group + 4].iter().map(named);
         let conflict = |a: usize, b: usize| {
             of_group(a).any(|(kind, address)| of_group(b).any(|(other, at)| address == at && kind.conflicts(other)))
         };

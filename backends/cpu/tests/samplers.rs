@@ -97,7 +97,8 @@ proptest! {
         for (place, actual) in places.iter().zip(all) {
             let [s, t, lod, _] = *place;
             let expected = oracle.sample([s.into(), t.into()], lod.into());
-            prop_assert!(oracle.accepts(actual, [s, t], lod.into()), "{:?}: {:?}, expected {:?}", place, actual, expected);
+            let accepted = oracle.accepts(actual, [s, t], lod.into());
+            prop_assert!(accepted, "{:?}: {:?}, expected {:?}", place, actual, expected);
         }
     }
 
@@ -114,7 +115,8 @@ proptest! {
             let y = (0.5 * w * width).hypot(0.1 * height);
             let lod = x.max(y).log2();
             let expected = oracle.sample([s, t], lod);
-            prop_assert!(oracle.accepts(actual, [place[0], place[1]], lod), "{:?}: {:?}, expected {:?}", place, actual, expected);
+            let accepted = oracle.accepts(actual, [place[0], place[1]], lod);
+            prop_assert!(accepted, "{:?}: {:?}, expected {:?}", place, actual, expected);
         }
     }
 
@@ -144,7 +146,8 @@ proptest! {
                 continue;
             }
             let (i, j) = (u.floor() as i64, v.floor() as i64);
-            let expected = [(0, 1), (1, 1), (1, 0), (0, 0)].map(|(x, y)| oracle.texel(0, i + x, j + y)[component] as f32);
+            let corners = [(0, 1), (1, 1), (1, 0), (0, 0)];
+            let expected = corners.map(|(x, y)| oracle.texel(0, i + x, j + y)[component] as f32);
             prop_assert_eq!(actual, expected, "{:?}", place);
         }
     }
@@ -161,12 +164,14 @@ proptest! {
         image.values.iter_mut().for_each(|texel| *texel = [texel[0].round(), 0.0, 0.0, 1.0]);
         let places: Vec<_> = places.iter().map(|[s, t, lod, reference]| [*s, *t, *lod, reference.round()]).collect();
         let texture = image.texture();
-        let oracle = |reference: f32| Oracle { image: &image, sampler, offset: [0, 0], reference: Some(reference.into()) };
-        let compared = evaluate("texture_depth_2d", "textureSampleCompareLevel(image, s, p.xy, p.w)", &texture, sampler, &places);
+        let oracle =
+            |reference: f32| Oracle { image: &image, sampler, offset: [0, 0], reference: Some(reference.into()) };
+        let depth = |expression: &str, sampler| evaluate("texture_depth_2d", expression, &texture, sampler, &places);
+        let compared = depth("textureSampleCompareLevel(image, s, p.xy, p.w)", sampler);
         for (place, actual) in places.iter().zip(compared) {
             prop_assert!(oracle(place[3]).accepts(actual, [place[0], place[1]], 0.0), "{:?}: {:?}", place, actual);
         }
-        let gathered = evaluate("texture_depth_2d", "textureGatherCompare(image, s, p.xy, p.w)", &texture, sampler, &places);
+        let gathered = depth("textureGatherCompare(image, s, p.xy, p.w)", sampler);
         let [width, height] = image.sizes[0].map(|size| size as f32);
         for (place, actual) in places.iter().zip(gathered) {
             let [u, v] = [place[0] * width - 0.5, place[1] * height - 0.5];
@@ -179,13 +184,13 @@ proptest! {
             }
         }
         let plain = Sampler { compare: None, ..sampler };
-        let depth = Oracle { image: &image, sampler: plain, offset: [0, 0], reference: None };
-        let all = evaluate("texture_depth_2d", "textureSampleLevel(image, s, p.xy, i32(p.z))", &texture, plain, &places);
+        let loaded = Oracle { image: &image, sampler: plain, offset: [0, 0], reference: None };
+        let all = depth("textureSampleLevel(image, s, p.xy, i32(p.z))", plain);
         for (place, actual) in places.iter().zip(all) {
             let texel = [actual[0], 0.0, 0.0, 1.0];
             let lod = f64::from(place[2].trunc());
             let at = [place[0], place[1]];
-            prop_assert!(depth.accepts(texel, at, lod), "{:?}: {:?}", place, actual);
+            prop_assert!(loaded.accepts(texel, at, lod), "{:?}: {:?}", place, actual);
         }
     }
 
@@ -206,7 +211,8 @@ proptest! {
             "textureSampleBaseClampToEdge(image, s, p.xy)",
             "textureGather(0, image, s, p.xy)",
         ] {
-            for (place, actual) in places.iter().zip(evaluate("texture_2d<f32>", expression, &texture, sampler, &places)) {
+            let all = evaluate("texture_2d<f32>", expression, &texture, sampler, &places);
+            for (place, actual) in places.iter().zip(all) {
                 let between = actual.iter().all(|value| *value >= low - 1e-4 && *value <= high + 1e-4);
                 prop_assert!(between, "{} at {:?}: {:?}", expression, place, actual);
             }

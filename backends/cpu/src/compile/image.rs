@@ -23,20 +23,13 @@ impl<'a> Compiler<'a> {
         level.map_or(Ok(Operand::Const(0)), |level| Ok(self.data(frame, level)?[0]))
     }
 
-    /// Registers for the components of a texel that are wanted.
-    fn texel(&mut self, frame: &Inlined<'a>, handle: Handle<Expression>) -> [Option<u32>; 4] {
-        let wanted = frame.wanted_components.get(&handle).copied().unwrap_or([false; 4]);
-        wanted.map(|wanted| wanted.then(|| self.registers.allocate()))
-    }
-
-    fn texel_value(
-        &self,
-        frame: &Inlined<'a>,
-        handle: Handle<Expression>,
-        to: [Option<u32>; 4],
-    ) -> Result<Vec<Operand>> {
+    /// Registers for the components of a texel that are wanted, and the value made of them.
+    fn texel(&mut self, frame: &Inlined<'a>, handle: Handle<Expression>) -> Result<([Option<u32>; 4], Vec<Operand>)> {
         let count = self.count(&self.inner(frame, handle))? as usize;
-        Ok(to[..count].iter().map(|to| to.map_or(Operand::Const(0), Operand::Lane)).collect())
+        let wanted = frame.wanted_components.get(&handle).copied().unwrap_or([false; 4]);
+        let to = [0, 1, 2, 3].map(|i| (i < count && wanted[i]).then(|| self.registers.allocate()));
+        let value = to[..count].iter().map(|to| to.map_or(Operand::Const(0), Operand::Lane));
+        Ok((to, value.collect()))
     }
 
     pub(super) fn image_load(&mut self, frame: &mut Inlined<'a>, handle: Handle<Expression>) -> Result<Vec<Operand>> {
@@ -48,9 +41,9 @@ impl<'a> Compiler<'a> {
         let texture = self.resource(frame, image)?;
         let at = self.data(frame, coordinate)?;
         let level = self.level(frame, level)?;
-        let to = self.texel(frame, handle);
+        let (to, value) = self.texel(frame, handle)?;
         self.emit(Op::TextureLoad { to, texture, x: at[0], y: at[1], level, mask: self.mask });
-        self.texel_value(frame, handle, to)
+        Ok(value)
     }
 
     pub(super) fn image_sample(&mut self, frame: &mut Inlined<'a>, handle: Handle<Expression>) -> Result<Vec<Operand>> {
@@ -77,22 +70,19 @@ impl<'a> Compiler<'a> {
                 _ => return unsupported("an offset of texels that is not constant"),
             },
         };
-        let mut converted = Operand::Const(0);
+        // A level that is an integer is converted.
+        let mut converted = None;
         let lod = match level {
             SampleLevel::Zero => SampleLod::Exact(Operand::Const(0)),
             SampleLevel::Exact(level) => {
                 let operand = self.data(frame, level)?[0];
-                SampleLod::Exact(match self.kind(frame, level)? {
-                    ScalarKind::Sint => {
-                        converted = self.unary(Unary::IntToFloat, operand);
-                        converted
-                    }
-                    ScalarKind::Uint => {
-                        converted = self.unary(Unary::UintToFloat, operand);
-                        converted
-                    }
-                    _ => operand,
-                })
+                let op = match self.kind(frame, level)? {
+                    ScalarKind::Sint => Some(Unary::IntToFloat),
+                    ScalarKind::Uint => Some(Unary::UintToFloat),
+                    _ => None,
+                };
+                converted = op.map(|op| self.unary(op, operand));
+                SampleLod::Exact(converted.unwrap_or(operand))
             }
             SampleLevel::Gradient { x, y } => {
                 let (x, y) = (self.data(frame, x)?, self.data(frame, y)?);
@@ -101,7 +91,7 @@ impl<'a> Compiler<'a> {
             SampleLevel::Auto | SampleLevel::Bias(_) => return unsupported("a sample with implicit derivatives"),
         };
         let reference = depth_ref.map(|reference| self.data(frame, reference)).transpose()?.map(|operands| operands[0]);
-        let to = self.texel(frame, handle);
+        let (to, value) = self.texel(frame, handle)?;
         self.emit(Op::TextureSample(Box::new(Sample {
             to,
             texture,
@@ -114,8 +104,8 @@ impl<'a> Compiler<'a> {
             clamp_to_edge,
             mask: self.mask,
         })));
-        self.release(&[converted]);
-        self.texel_value(frame, handle, to)
+        self.release(converted.as_slice());
+        Ok(value)
     }
 
     pub(super) fn image_query(
