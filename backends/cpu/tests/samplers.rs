@@ -48,7 +48,8 @@ fn image() -> impl Strategy<Value = Image> {
 /// Two coordinates, a level of detail and one number more.
 fn places() -> impl Strategy<Value = Vec<[f32; 4]>> {
     let coordinate = || prop_oneof![-3.0f32..3.0, (-24i32..24).prop_map(|i| i as f32 / 8.0)];
-    let place = (coordinate(), coordinate(), -1.0f32..5.0, -4.0f32..4.0);
+    let lod = prop_oneof![9 => -1.0f32..5.0, 1 => Just(0.0)];
+    let place = (coordinate(), coordinate(), lod, -4.0f32..4.0);
     proptest::collection::vec(place.prop_map(|(s, t, lod, extra)| [s, t, lod, extra]), 70)
 }
 

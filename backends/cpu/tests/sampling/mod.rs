@@ -163,7 +163,7 @@ impl Oracle<'_> {
         steps.iter().any(|x| {
             steps.iter().any(|y| {
                 let at = [moved(at[0], *x), moved(at[1], *y)];
-                steps.iter().any(|step| near(self.sample(at, lod + step * 1e-5)))
+                steps.iter().any(|step| near(self.sample(at, lod * (1.0 + step * 1e-5))))
             })
         })
     }
