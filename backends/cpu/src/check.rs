@@ -1,6 +1,10 @@
 //! Checked execution: what a kernel must not do and no driver tells.
 
+mod shared;
+
 use std::collections::BTreeMap;
+
+pub(crate) use shared::Shared;
 
 /// What went wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -14,6 +18,9 @@ pub enum FaultKind {
     WriteOutOfBounds,
     /// Two invocations used a word of workgroup memory without a barrier between, and one of them wrote it.
     Race,
+    /// Two workgroups of a dispatch used a word of a buffer or a texel, and one of them wrote it, not both
+    /// atomically.
+    RaceBetweenWorkgroups,
     /// A barrier that not all invocations of the workgroup reached.
     DivergentBarrier,
 }
@@ -25,6 +32,7 @@ impl std::fmt::Display for FaultKind {
             Self::ReadOutOfBounds => "reads out of bounds",
             Self::WriteOutOfBounds => "writes out of bounds",
             Self::Race => "uses workgroup memory that another invocation uses without a barrier between",
+            Self::RaceBetweenWorkgroups => "uses memory that another workgroup uses",
             Self::DivergentBarrier => "a barrier that not all invocations reach",
         })
     }
@@ -40,6 +48,8 @@ pub struct Fault {
     pub offset: Option<usize>,
     /// Workgroup of the first time.
     pub workgroup: [u32; 3],
+    /// The other workgroup of a race between two.
+    pub other_workgroup: Option<[u32; 3]>,
     /// Index in its workgroup of the invocation of the first time.
     pub invocation: u32,
     /// How often.
@@ -66,13 +76,20 @@ pub(crate) enum Use {
     Read,
     Write,
     Atomic,
-    /// Atomic, and the value before does not matter.
+    AtomicLoad,
     AtomicStore,
 }
 
 impl Use {
+    pub(crate) fn out_of_bounds(self) -> FaultKind {
+        match self {
+            Self::Read | Self::AtomicLoad => FaultKind::ReadOutOfBounds,
+            _ => FaultKind::WriteOutOfBounds,
+        }
+    }
+
     fn is_atomic(self) -> bool {
-        matches!(self, Self::Atomic | Self::AtomicStore)
+        matches!(self, Self::Atomic | Self::AtomicLoad | Self::AtomicStore)
     }
 }
 
@@ -82,10 +99,42 @@ pub(crate) struct Checker {
     words: Vec<Word>,
     epoch: u32,
     workgroup: [u32; 3],
+    group_count: [u32; 3],
+    shared: Shared,
     faults: BTreeMap<(usize, FaultKind), Fault>,
 }
 
+/// What is wrong, and which other workgroup is part of it.
+pub(crate) struct Found {
+    kind: FaultKind,
+    other_workgroup: Option<[u32; 3]>,
+}
+
+impl From<FaultKind> for Found {
+    fn from(kind: FaultKind) -> Self {
+        Self { kind, other_workgroup: None }
+    }
+}
+
 impl Checker {
+    pub(crate) fn new(group_count: [u32; 3], shared: Shared) -> Self {
+        Self { group_count, shared, ..Self::default() }
+    }
+
+    /// Whether uses of a binding's resource are to be noted.
+    pub(crate) fn is_written(&self, binding: u32) -> bool {
+        self.shared.is_written(binding)
+    }
+
+    /// What using a location of a bound resource violates.
+    pub(crate) fn shared_use(&mut self, binding: u32, location: u32, usage: Use) -> Option<Found> {
+        let [width, height, _] = self.group_count;
+        let [x, y, z] = self.workgroup;
+        let other = self.shared.note(binding, location, usage, x + width * (y + height * z))?;
+        let other_workgroup = Some([other % width, other / width % height, other / (width * height)]);
+        Some(Found { kind: FaultKind::RaceBetweenWorkgroups, other_workgroup })
+    }
+
     pub(crate) fn begin(&mut self, workgroup: [u32; 3], words: usize) {
         self.workgroup = workgroup;
         self.words.clear();
@@ -98,11 +147,13 @@ impl Checker {
     }
 
     /// Notes a fault of instruction `op`.
-    pub(crate) fn fault(&mut self, op: usize, span: naga::Span, kind: FaultKind, invocation: u32) {
+    pub(crate) fn fault(&mut self, op: usize, span: naga::Span, found: Found, invocation: u32) {
+        let Found { kind, other_workgroup } = found;
         let fault = self.faults.entry((op, kind)).or_insert(Fault {
             kind,
             offset: span.to_range().map(|range| range.start),
             workgroup: self.workgroup,
+            other_workgroup,
             invocation,
             count: 0,
         });
@@ -113,18 +164,18 @@ impl Checker {
     pub(crate) fn workgroup_use(&mut self, address: usize, usage: Use, invocation: u32) -> Option<FaultKind> {
         let epoch = self.epoch;
         let Some(word) = self.words.get_mut(address) else {
-            return Some(if usage == Use::Read { FaultKind::ReadOutOfBounds } else { FaultKind::WriteOutOfBounds });
+            return Some(usage.out_of_bounds());
         };
         let both_atomic = usage.is_atomic() && word.atomic;
         let written_by_other = word.write_epoch == epoch && word.writer != invocation && !both_atomic;
         let read_by_other =
             word.read_epoch == epoch && (word.many_readers || word.reader != invocation) && usage != Use::Read;
-        let uninitialized = matches!(usage, Use::Read | Use::Atomic) && !word.written;
+        let uninitialized = usage != Use::Write && usage != Use::AtomicStore && !word.written;
         if usage == Use::Read {
             word.many_readers = word.read_epoch == epoch && (word.many_readers || word.reader != invocation);
             (word.read_epoch, word.reader) = (epoch, invocation);
         } else {
-            word.written = true;
+            word.written |= usage != Use::AtomicLoad;
             (word.write_epoch, word.writer, word.atomic) = (epoch, invocation, usage.is_atomic());
         }
         match (uninitialized, written_by_other || read_by_other) {

@@ -1,11 +1,12 @@
 use std::collections::HashMap;
 
 use glam::UVec2;
+use limpid::kernel::Kernel;
 use limpid::plan::{Bound, Grid, OUTPUT, Pass, Stage};
 use limpid::resource::{Copy, Format, Kind};
 use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
-use crate::{Binding, Buffer, Error, Executor, Fault, TexelFormat, Texture};
+use crate::{Binding, Buffer, CompileError, Error, Executor, Fault, TexelFormat, Texture};
 
 /// The caller's images of one frame, of any format. Encodings are set in
 /// [`Settings::conventions`](limpid::settings::Conventions).
@@ -102,6 +103,15 @@ fn find_texture<'a>(
     }
 }
 
+fn compile(kernel: &Kernel) -> Result<Executor, Error> {
+    Executor::new(&kernel.module, &kernel.info, kernel.name).map_err(|source| {
+        let offset = if let CompileError::Unsupported { offset, .. } = source { offset } else { None };
+        let place = offset.and_then(|offset| kernel.linked.place(offset));
+        let place = place.unwrap_or_else(|| format!("kernels/{}.wgsl", kernel.name));
+        Error::Compile { kernel: kernel.name, place, source }
+    })
+}
+
 impl Denoiser {
     /// Compiles kernels and allocates memory for images of up to `size` pixels.
     ///
@@ -118,10 +128,6 @@ impl Denoiser {
     ///
     /// [`Error::Compile`].
     pub fn with_core(core: limpid::Denoiser) -> Result<Self, Error> {
-        let compile = |kernel: &limpid::kernel::Kernel| {
-            Executor::new(&kernel.module, &kernel.info, kernel.name)
-                .map_err(|source| Error::Compile { kernel: kernel.name, source })
-        };
         let executors = core.kernels().iter().map(compile).collect::<Result<_, _>>()?;
         let allocations = allocate(core.plan());
         let constants = Buffer::zeroed(size_of::<FrameConstants>() / 4);
@@ -290,5 +296,38 @@ impl Denoiser {
         let mut rays = self.intermediate_buffer("rays")?.read();
         rays.truncate(count as usize);
         Some(rays)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_supported_is_named_with_kernel_file_and_line() {
+        let core = limpid::Denoiser::new(&Settings::default(), UVec2::new(64, 64)).unwrap();
+        for kernel in core.kernels() {
+            assert!(compile(kernel).is_ok());
+            // Texture after texture becomes one of three dimensions.
+            for (handle, variable) in kernel.module.global_variables.iter() {
+                let naga::TypeInner::Image { class, arrayed, .. } = kernel.module.types[variable.ty].inner else {
+                    continue;
+                };
+                let mut changed = kernel.clone();
+                let inner = naga::TypeInner::Image { dim: naga::ImageDimension::D3, class, arrayed };
+                let ty = changed.module.types.insert(naga::Type { name: None, inner }, naga::Span::UNDEFINED);
+                changed.module.global_variables[handle].ty = ty;
+                let name = variable.name.as_deref().unwrap();
+                let error = compile(&changed).err().unwrap();
+                let Error::Compile { kernel: named, place, .. } = &error else { panic!("{error}") };
+                assert_eq!(*named, kernel.name);
+                let (file, line) = place.split_once(':').unwrap();
+                let text = std::fs::read_to_string(format!("../../{file}")).unwrap();
+                let line = text.lines().nth(line.parse::<usize>().unwrap() - 1).unwrap();
+                assert!(line.contains("var") && line.contains(name), "{place}: {line}, expected {name}");
+                assert!(error.to_string().contains(&format!("{}`, {place}: ", kernel.name)), "{error}");
+                assert!(error.to_string().contains(&format!("`{name}`")), "{error}");
+            }
+        }
     }
 }

@@ -8,12 +8,37 @@ pub enum CompileError {
         /// The name asked for.
         name: String,
     },
+    /// See [`Executor::with_subgroup_size`](crate::Executor::with_subgroup_size).
+    #[error("a subgroup of {size} invocations, expected 4, 8, 16, 32 or 64")]
+    SubgroupSize {
+        /// The size asked for.
+        size: u32,
+    },
     /// The kernel uses something that the executor does not know.
     #[error("the CPU executor does not support {construct}")]
     Unsupported {
         /// What it is.
         construct: String,
+        /// Where it is in the source that the module was parsed from, in bytes; none if the module does not know.
+        /// [`naga::Span::location`] turns it into a line:
+        ///
+        /// ```
+        /// # let (source, offset) = ("var a: u32;\nvar b: u64;", 12);
+        /// let place = naga::Span::new(offset as u32, offset as u32).location(source);
+        /// assert_eq!(place.line_number, 2);
+        /// ```
+        offset: Option<usize>,
     },
+}
+
+impl CompileError {
+    /// The same with its place, if it has none yet.
+    pub(crate) fn at(mut self, span: naga::Span) -> Self {
+        if let Self::Unsupported { offset: offset @ None, .. } = &mut self {
+            *offset = span.to_range().map(|range| range.start);
+        }
+        self
+    }
 }
 
 /// Why a kernel could not be run.
@@ -42,10 +67,12 @@ pub enum Error {
     #[error(transparent)]
     Limpid(#[from] limpid::Error),
     /// A kernel uses something that the executor does not know.
-    #[error("kernel `{kernel}`: {source}")]
+    #[error("kernel `{kernel}`, {place}: {source}")]
     Compile {
         /// Name of the kernel.
         kernel: &'static str,
+        /// Where in its source, as `file:line`, or the file if the line is not known.
+        place: String,
         /// What it is.
         source: CompileError,
     },

@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use crate::compile::{BindingSlot, Code, SlotKind, compile};
 use crate::machine::{Bound, Machine};
-use crate::{Buffer, CompileError, DispatchError, Fault, Texture};
+use crate::{Buffer, CompileError, DispatchError, Fault, Sampler, Texture};
 
 /// A resource for a binding of a kernel.
 #[derive(Debug, Clone, Copy)]
@@ -23,6 +23,11 @@ impl<'a> Binding<'a> {
     pub fn texture(group: u32, binding: u32, texture: &'a Texture) -> Self {
         Self { group, binding, bound: Bound::Texture(texture) }
     }
+
+    /// Binds a sampler.
+    pub fn sampler(group: u32, binding: u32, sampler: Sampler) -> Self {
+        Self { group, binding, bound: Bound::Sampler(sampler) }
+    }
 }
 
 /// A compiled compute kernel.
@@ -41,6 +46,21 @@ impl Executor {
         Ok(Self { code: compile(module, info, entry_point)? })
     }
 
+    /// The same with subgroups of `size` invocations rather than [`SUBGROUP_SIZE`](crate::SUBGROUP_SIZE).
+    /// Invocations of a workgroup are in subgroups by their local index. What a subgroup operation reads from an
+    /// invocation that does not exist or does not take part is 0; sums and products go through invocations in order.
+    ///
+    /// # Errors
+    ///
+    /// [`CompileError::SubgroupSize`] for a size other than 4, 8, 16, 32 and 64.
+    pub fn with_subgroup_size(mut self, size: u32) -> Result<Self, CompileError> {
+        if ![4, 8, 16, 32, 64].contains(&size) {
+            return Err(CompileError::SubgroupSize { size });
+        }
+        self.code.subgroup_size = size;
+        Ok(self)
+    }
+
     /// Number of instructions.
     pub fn instruction_count(&self) -> usize {
         self.code.ops.len()
@@ -52,9 +72,16 @@ impl Executor {
         let fail = |expected| DispatchError::Binding { name: name.clone(), group: *group, binding: *binding, expected };
         match (given.map(|given| given.bound), kind) {
             (Some(bound @ Bound::Buffer(_)), SlotKind::Buffer { .. }) => Ok(bound),
-            (Some(bound @ Bound::Texture(_)), SlotKind::Texture) => Ok(bound),
+            (Some(bound @ Bound::Texture(_)), SlotKind::Texture { .. }) => Ok(bound),
+            (Some(bound @ Bound::Sampler(sampler)), SlotKind::Sampler { comparison })
+                if sampler.compare.is_some() == *comparison =>
+            {
+                Ok(bound)
+            }
+            (_, SlotKind::Sampler { comparison: true }) => Err(fail("a sampler that compares")),
+            (_, SlotKind::Sampler { comparison: false }) => Err(fail("a sampler that does not compare")),
             (_, SlotKind::Buffer { .. }) => Err(fail("a buffer")),
-            (_, SlotKind::Texture) => Err(fail("a texture")),
+            (_, SlotKind::Texture { .. }) => Err(fail("a texture")),
         }
     }
 
@@ -73,8 +100,8 @@ impl Executor {
     }
 
     /// Runs `groups` workgroups one after another and watches what they do: uninitialised or racy use of
-    /// workgroup memory, accesses out of bounds, barriers that not all reach. Results are those of
-    /// [`dispatch`](Self::dispatch). Races between workgroups are not seen.
+    /// workgroup memory, races between workgroups, accesses out of bounds, barriers that not all reach. Results are
+    /// those of [`dispatch`](Self::dispatch). Races for buffers inside a workgroup are not seen.
     ///
     /// # Errors
     ///

@@ -1,13 +1,18 @@
 //! Runs compiled kernels, one workgroup at a time, every instruction for all of its invocations.
 
-use std::sync::atomic::{AtomicU32, Ordering};
+mod memory;
+mod sample;
+mod subgroup;
+mod texture;
+mod watch;
 
 use crate::LANES;
-use crate::check::{Checker, Fault, FaultKind, Use};
+use crate::check::{Checker, Fault, Shared, Use};
 use crate::compile::Code;
 use crate::eval::{f, with_binary, with_unary};
-use crate::op::{Atomic, BuiltIn, Memory, Op, Operand};
-use crate::resource::{Buffer, Channel, Texture};
+use crate::op::{Atomic, BuiltIn, Op, Operand};
+use crate::resource::{Buffer, Texture};
+use crate::sampler::Sampler;
 
 /// One register for a row of invocations.
 pub(crate) type Lanes = [u32; LANES];
@@ -17,6 +22,7 @@ pub(crate) type Lanes = [u32; LANES];
 pub(crate) enum Bound<'a> {
     Buffer(&'a Buffer),
     Texture(&'a Texture),
+    Sampler(Sampler),
 }
 
 pub(crate) struct Machine<'a> {
@@ -32,6 +38,22 @@ pub(crate) struct Machine<'a> {
     /// Instruction that is running.
     current: usize,
     checker: Option<Checker>,
+}
+
+/// For each binding the first one with the same resource, if the kernel can write that.
+fn written_resources(code: &Code, bound: &[Bound<'_>]) -> Vec<Option<u32>> {
+    let same = |a: &Bound<'_>, b: &Bound<'_>| match (a, b) {
+        (Bound::Buffer(a), Bound::Buffer(b)) => std::ptr::eq(*a, *b),
+        (Bound::Texture(a), Bound::Texture(b)) => std::ptr::eq(*a, *b),
+        _ => false,
+    };
+    let resource = |one: &Bound<'_>| {
+        let mut bindings = bound.iter().zip(&code.bindings);
+        let is_written = bindings.any(|(other, slot)| same(one, other) && slot.kind.is_writable());
+        let first = bound.iter().position(|other| same(one, other));
+        first.filter(|_| is_written).map(|first| first as u32)
+    };
+    bound.iter().map(resource).collect()
 }
 
 impl<'a> Machine<'a> {
@@ -54,7 +76,8 @@ impl<'a> Machine<'a> {
 
     /// A machine that watches what kernels do.
     pub(crate) fn checked(code: &'a Code, bound: &'a [Bound<'a>], group_count: [u32; 3]) -> Self {
-        Self { checker: Some(Checker::default()), ..Self::new(code, bound, group_count) }
+        let checker = Checker::new(group_count, Shared::new(written_resources(code, bound)));
+        Self { checker: Some(checker), ..Self::new(code, bound, group_count) }
     }
 
     pub(crate) fn into_faults(self) -> Vec<Fault> {
@@ -68,57 +91,6 @@ impl<'a> Machine<'a> {
             checker.begin(group, self.workgroup.len());
         }
         run(self);
-    }
-
-    /// Calls `check` for every invocation that is active, and notes what it finds.
-    fn check(&mut self, mask: Option<u32>, check: impl Fn(&mut Checker, &Self, usize, usize) -> Option<FaultKind>) {
-        let Some(mut checker) = self.checker.take() else { return };
-        let invocations = self.code.workgroup_size.iter().product::<u32>() as usize;
-        for index in 0..invocations {
-            let (row, lane) = (index / LANES, index % LANES);
-            if self.mask_row(mask, row)[lane] == 0 {
-                continue;
-            }
-            if let Some(kind) = check(&mut checker, self, row, lane) {
-                checker.fault(self.current, self.code.spans[self.current], kind, index as u32);
-            }
-        }
-        self.checker = Some(checker);
-    }
-
-    #[cold]
-    fn check_memory(&mut self, memory: Memory, address: Operand, offset: u32, usage: Use, mask: Option<u32>) {
-        self.check(mask, |checker, machine, row, lane| {
-            let address = machine.row(address, row)[lane].wrapping_add(offset) as usize;
-            match memory {
-                Memory::Workgroup => checker.workgroup_use(address, usage, (row * LANES + lane) as u32),
-                Memory::Buffer(slot) => {
-                    let inside = machine.buffer(slot).is_some_and(|buffer| address < buffer.words.len());
-                    let kind =
-                        if usage == Use::Read { FaultKind::ReadOutOfBounds } else { FaultKind::WriteOutOfBounds };
-                    (!inside).then_some(kind)
-                }
-            }
-        });
-    }
-
-    #[cold]
-    fn check_texture(&mut self, texture: u32, at: [Operand; 3], mask: Option<u32>, kind: FaultKind) {
-        let Some(texture) = self.texture(texture) else { return };
-        self.check(mask, |_, machine, row, lane| {
-            let [x, y, level] = at.map(|operand| machine.row(operand, row)[lane]);
-            let level = texture.levels.get(level as usize);
-            level.is_none_or(|level| x >= level.width || y >= level.height).then_some(kind)
-        });
-    }
-
-    #[cold]
-    fn check_barrier(&mut self, mask: Option<u32>) {
-        let masks: Vec<Lanes> = (0..self.rows).map(|row| self.mask_row(mask, row)).collect();
-        self.check(None, |_, _, row, lane| (masks[row][lane] == 0).then_some(FaultKind::DivergentBarrier));
-        if let Some(checker) = &mut self.checker {
-            checker.barrier();
-        }
     }
 
     #[inline(always)]
@@ -255,6 +227,11 @@ impl<'a> Machine<'a> {
         match (to, value) {
             (to, BuiltIn::WorkgroupId(axis)) => self.set_scalar(to, self.group[axis as usize]),
             (to, BuiltIn::WorkgroupCount(axis)) => self.set_scalar(to, self.group_count[axis as usize]),
+            (to, BuiltIn::SubgroupSize) => self.set_scalar(to, self.code.subgroup_size),
+            (to, BuiltIn::SubgroupCount) => {
+                let invocations: u32 = size.iter().product();
+                self.set_scalar(to, invocations.div_ceil(self.code.subgroup_size));
+            }
             (Operand::Lane(register), value) => {
                 for row in 0..self.rows {
                     let to = self.at(register, row);
@@ -266,268 +243,14 @@ impl<'a> Machine<'a> {
                                 let axis = axis as usize;
                                 self.group[axis].wrapping_mul(size[axis]).wrapping_add(local(index)[axis])
                             }
+                            BuiltIn::SubgroupId => index / self.code.subgroup_size,
+                            BuiltIn::SubgroupLane => index % self.code.subgroup_size,
                             _ => index,
                         };
                     }
                 }
             }
             _ => {}
-        }
-    }
-
-    fn buffer(&self, slot: u32) -> Option<&'a Buffer> {
-        match self.bound.get(slot as usize) {
-            Some(Bound::Buffer(buffer)) => Some(buffer),
-            _ => None,
-        }
-    }
-
-    fn texture(&self, slot: u32) -> Option<&'a Texture> {
-        match self.bound.get(slot as usize) {
-            Some(Bound::Texture(texture)) => Some(texture),
-            _ => None,
-        }
-    }
-
-    #[inline(always)]
-    fn load(&mut self, to: Operand, memory: Memory, address: Operand, offset: u32) {
-        let read = |machine: &Self, address: u32| {
-            let address = address.wrapping_add(offset);
-            match memory {
-                Memory::Workgroup => machine.workgroup.get(address as usize).copied().unwrap_or(0),
-                Memory::Buffer(slot) => machine.buffer(slot).map_or(0, |buffer| buffer.get(address)),
-            }
-        };
-        let Operand::Lane(register) = to else {
-            let value = read(self, self.scalar(address));
-            return self.set_scalar(to, value);
-        };
-        for row in 0..self.rows {
-            let to = self.at(register, row);
-            let Operand::Lane(address) = address else {
-                self.lanes[to] = [read(self, self.scalar(address)); LANES];
-                continue;
-            };
-            let addresses = self.lanes[self.at(address, row)];
-            let mut values = [0; LANES];
-            for (value, address) in values.iter_mut().zip(addresses) {
-                *value = read(self, address);
-            }
-            self.lanes[to] = values;
-        }
-    }
-
-    #[inline(always)]
-    fn store(&mut self, memory: Memory, address: Operand, offset: u32, a: Operand, mask: Option<u32>) {
-        for row in 0..self.rows {
-            let (mask, addresses, values) = (self.mask_row(mask, row), self.row(address, row), self.row(a, row));
-            for i in 0..LANES {
-                if mask[i] != 0 {
-                    let address = addresses[i].wrapping_add(offset);
-                    match memory {
-                        Memory::Workgroup => {
-                            if let Some(word) = self.workgroup.get_mut(address as usize) {
-                                *word = values[i];
-                            }
-                        }
-                        Memory::Buffer(slot) => {
-                            if let Some(buffer) = self.buffer(slot) {
-                                buffer.set(address, values[i]);
-                            }
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    fn atomic_word(op: Atomic, word: &AtomicU32, value: u32) -> u32 {
-        let update = |function: &dyn Fn(u32) -> u32| {
-            let result = word.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |old| Some(function(old)));
-            result.unwrap_or_default()
-        };
-        match op {
-            Atomic::Add => word.fetch_add(value, Ordering::Relaxed),
-            Atomic::Subtract => word.fetch_sub(value, Ordering::Relaxed),
-            Atomic::And => word.fetch_and(value, Ordering::Relaxed),
-            Atomic::Xor => word.fetch_xor(value, Ordering::Relaxed),
-            Atomic::Or => word.fetch_or(value, Ordering::Relaxed),
-            Atomic::MinU => word.fetch_min(value, Ordering::Relaxed),
-            Atomic::MaxU => word.fetch_max(value, Ordering::Relaxed),
-            Atomic::MinI => update(&|old| old.cast_signed().min(value.cast_signed()).cast_unsigned()),
-            Atomic::MaxI => update(&|old| old.cast_signed().max(value.cast_signed()).cast_unsigned()),
-            Atomic::Exchange => word.swap(value, Ordering::Relaxed),
-        }
-    }
-
-    #[expect(clippy::too_many_arguments, reason = "the fields of one instruction")]
-    fn atomic(
-        &mut self,
-        op: Atomic,
-        to: Option<u32>,
-        memory: Memory,
-        address: Operand,
-        offset: u32,
-        a: Operand,
-        mask: Option<u32>,
-    ) {
-        for row in 0..self.rows {
-            let (mask, addresses, values) = (self.mask_row(mask, row), self.row(address, row), self.row(a, row));
-            let mut old = [0; LANES];
-            for i in 0..LANES {
-                if mask[i] == 0 {
-                    continue;
-                }
-                let address = addresses[i].wrapping_add(offset) as usize;
-                match memory {
-                    Memory::Workgroup => {
-                        if let Some(word) = self.workgroup.get_mut(address) {
-                            let cell = AtomicU32::new(*word);
-                            old[i] = Self::atomic_word(op, &cell, values[i]);
-                            *word = cell.into_inner();
-                        }
-                    }
-                    Memory::Buffer(slot) => {
-                        if let Some(word) = self.buffer(slot).and_then(|buffer| buffer.words.get(address)) {
-                            old[i] = Self::atomic_word(op, word, values[i]);
-                        }
-                    }
-                }
-            }
-            if let Some(to) = to {
-                let to = self.at(to, row);
-                self.lanes[to] = old;
-            }
-        }
-    }
-
-    /// Where each texel begins, in words; `u32::MAX` outside of the texture.
-    #[inline(always)]
-    fn texel_words(&self, texture: &Texture, x: Operand, y: Operand, level: Operand, row: usize) -> Lanes {
-        let words = texture.format().words() as u32;
-        let (x, y) = (self.row(x, row), self.row(y, row));
-        let mut first = [u32::MAX; LANES];
-        if let Operand::Lane(_) = level {
-            let level = self.row(level, row);
-            for i in 0..LANES {
-                let level = texture.levels.get(level[i] as usize);
-                if let Some(level) = level.filter(|level| x[i] < level.width && y[i] < level.height) {
-                    first[i] = level.first_word + (y[i] * level.width + x[i]) * words;
-                }
-            }
-        } else if let Some(level) = texture.levels.get(self.scalar(level) as usize) {
-            for i in 0..LANES {
-                let inside = (x[i] < level.width) & (y[i] < level.height);
-                let texel = y[i].wrapping_mul(level.width).wrapping_add(x[i]).wrapping_mul(words);
-                first[i] = if inside { texel.wrapping_add(level.first_word) } else { u32::MAX };
-            }
-        }
-        first
-    }
-
-    #[inline(always)]
-    fn texture_load(&mut self, to: [Option<u32>; 4], texture: u32, x: Operand, y: Operand, level: Operand) {
-        let Some(texture) = self.texture(texture) else { return };
-        let format = texture.format();
-        for row in 0..self.rows {
-            let first = self.texel_words(texture, x, y, level, row);
-            let gather = |offset: u32| {
-                let mut values = [0; LANES];
-                for (value, first) in values.iter_mut().zip(first) {
-                    let word = texture.words.get(first.wrapping_add(offset) as usize);
-                    *value = if first == u32::MAX { 0 } else { word.map_or(0, |word| word.load(Ordering::Relaxed)) };
-                }
-                values
-            };
-            for (component, to) in to.into_iter().enumerate() {
-                let Some(to) = to.map(|register| self.at(register, row)) else { continue };
-                self.lanes[to] = if component < format.components() {
-                    let (word, shift) = format.position(component);
-                    decoded(format.channel(), gather(word as u32), shift, &first)
-                } else {
-                    [if component == 3 { format.channel().one() } else { 0 }; LANES]
-                };
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn texture_store(&mut self, texture: u32, x: Operand, y: Operand, texel: [Operand; 4], mask: Option<u32>) {
-        let Some(texture) = self.texture(texture) else { return };
-        let format = texture.format();
-        for row in 0..self.rows {
-            let mask = self.mask_row(mask, row);
-            let first = self.texel_words(texture, x, y, Operand::Const(0), row);
-            let values = texel.map(|operand| self.row(operand, row));
-            let mut words = [[0; LANES]; 4];
-            for (component, values) in values.iter().enumerate().take(format.components()) {
-                let (word, shift) = format.position(component);
-                encode(format.channel(), values, shift, &mut words[word]);
-            }
-            for i in 0..LANES {
-                if mask[i] != 0 && first[i] != u32::MAX {
-                    for (offset, word) in words[..format.words()].iter().enumerate() {
-                        if let Some(cell) = texture.words.get(first[i] as usize + offset) {
-                            cell.store(word[i], Ordering::Relaxed);
-                        }
-                    }
-                }
-            }
-        }
-    }
-
-    fn read_indexed(&mut self, to: Operand, base: Operand, stride: u32, count: u32, index: Operand) {
-        let clamped = |index: u32| index.min(count - 1) * stride;
-        let Operand::Lane(to) = to else {
-            if let Operand::Scalar(base) = base {
-                let value = self.scalars[(base + clamped(self.scalar(index))) as usize];
-                self.set_scalar(to, value);
-            }
-            return;
-        };
-        for row in 0..self.rows {
-            let to = self.at(to, row);
-            match (base, index) {
-                (Operand::Lane(base), Operand::Lane(_)) => {
-                    let index = self.row(index, row);
-                    let mut values = [0; LANES];
-                    for i in 0..LANES {
-                        values[i] = self.lanes[self.at(base + clamped(index[i]), row)][i];
-                    }
-                    self.lanes[to] = values;
-                }
-                (Operand::Lane(base), index) => {
-                    self.lanes[to] = self.lanes[self.at(base + clamped(self.scalar(index)), row)];
-                }
-                (Operand::Scalar(base), index) => {
-                    let index = self.row(index, row);
-                    self.lanes[to] = index.map(|index| self.scalars[(base + clamped(index)) as usize]);
-                }
-                (Operand::Const(_), _) => {}
-            }
-        }
-    }
-
-    fn write_indexed(&mut self, op: &Op) {
-        let Op::WriteIndexed { base, stride, count, index, a, mask } = *op else { return };
-        let clamped = |index: u32| index.min(count - 1) * stride;
-        match base {
-            Operand::Scalar(base) => {
-                let at = base + clamped(self.scalar(index));
-                self.scalars[at as usize] = self.scalar(a);
-            }
-            Operand::Lane(base) => {
-                for row in 0..self.rows {
-                    let (mask, index, a) = (self.mask_row(mask, row), self.row(index, row), self.row(a, row));
-                    for i in 0..LANES {
-                        if mask[i] != 0 {
-                            let at = self.at(base + clamped(index[i]), row);
-                            self.lanes[at][i] = a[i];
-                        }
-                    }
-                }
-            }
-            Operand::Const(_) => {}
         }
     }
 
@@ -543,44 +266,6 @@ impl<'a> Machine<'a> {
     #[inline(always)]
     fn any(&self, mask: u32) -> bool {
         (0..self.rows).any(|row| self.lanes[self.at(mask, row)].iter().fold(0, |any, lane| any | lane) != 0)
-    }
-}
-
-/// Components of texels from the words that hold them; 0 where there is no texel.
-#[inline(always)]
-fn decoded(channel: Channel, words: Lanes, shift: u32, first: &Lanes) -> Lanes {
-    macro_rules! each {
-        ($channel:expr) => {{
-            let mut values = words;
-            for i in 0..LANES {
-                let value = $channel.decode(words[i] >> shift);
-                values[i] = if first[i] == u32::MAX { 0 } else { value };
-            }
-            values
-        }};
-    }
-    // One loop each, so that each is made of vector instructions.
-    match channel {
-        Channel::Float32 => each!(Channel::Float32),
-        Channel::Float16 => each!(Channel::Float16),
-        Channel::Uint(32) => each!(Channel::Uint(32)),
-        other => each!(other),
-    }
-}
-
-/// Adds components to the words of texels.
-#[inline(always)]
-fn encode(channel: Channel, values: &Lanes, shift: u32, words: &mut Lanes) {
-    macro_rules! each {
-        ($channel:expr) => {
-            for i in 0..LANES {
-                words[i] |= $channel.encode(values[i]) << shift;
-            }
-        };
-    }
-    match channel {
-        Channel::Float16 => each!(Channel::Float16),
-        other => each!(other),
     }
 }
 
@@ -643,34 +328,39 @@ fn run<'a>(machine: &mut Machine<'a>) {
                 }
                 machine.store(memory, address, offset, a, mask);
             }
-            Op::Atomic { op, to, memory, address, offset, a, mask } => {
+            Op::Atomic { op: kind, memory, address, offset, mask, .. } => {
                 if machine.checker.is_some() {
-                    let stores = op == Atomic::Exchange && to.is_none();
-                    let usage = if stores { Use::AtomicStore } else { Use::Atomic };
+                    let usage = match kind {
+                        Atomic::Load => Use::AtomicLoad,
+                        Atomic::Store => Use::AtomicStore,
+                        _ => Use::Atomic,
+                    };
                     machine.check_memory(memory, address, offset, usage, mask);
                 }
-                machine.atomic(op, to, memory, address, offset, a, mask);
+                machine.atomic(op);
             }
             Op::ArrayLength { to, buffer, offset, stride } => {
-                let words = machine.buffer(buffer).map_or(0, |buffer| buffer.words.len() as u32);
-                machine.set_scalar(to, words.saturating_sub(offset) / stride);
+                let bytes = machine.buffer(buffer).map_or(0, |buffer| 4 * buffer.words.len() as u64);
+                machine.set_scalar(to, (bytes.saturating_sub(offset.into()) / u64::from(stride)) as u32);
             }
             Op::TextureLoad { to, texture, x, y, level, mask } => {
                 if machine.checker.is_some() {
-                    machine.check_texture(texture, [x, y, level], mask, FaultKind::ReadOutOfBounds);
+                    machine.check_texture(texture, [x, y, level], Use::Read, mask);
                 }
                 machine.texture_load(to, texture, x, y, level);
             }
+            Op::TextureSample(ref sample) => machine.sample(sample),
             Op::TextureStore { texture, x, y, texel, mask } => {
                 if machine.checker.is_some() {
                     let at = [x, y, Operand::Const(0)];
-                    machine.check_texture(texture, at, mask, FaultKind::WriteOutOfBounds);
+                    machine.check_texture(texture, at, Use::Write, mask);
                 }
                 machine.texture_store(texture, x, y, texel, mask);
             }
-            Op::Barrier { mask } => {
+            Op::Subgroup { .. } => machine.subgroup(op),
+            Op::Barrier { mask, orders_workgroup } => {
                 if machine.checker.is_some() {
-                    machine.check_barrier(mask);
+                    machine.check_barrier(mask, orders_workgroup);
                 }
             }
             Op::TextureSize { to, texture, level } => {

@@ -133,6 +133,8 @@ pub(crate) enum Binary {
 /// What an atomic operation does with the value in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Atomic {
+    Load,
+    Store,
     Add,
     Subtract,
     And,
@@ -145,13 +147,15 @@ pub(crate) enum Atomic {
     Exchange,
 }
 
-/// Memory with addresses, in words.
+/// Memory with addresses: in words, or in half words for half floats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Memory {
     /// Shared by the workgroup.
     Workgroup,
     /// A bound buffer, by its place among the program's bindings.
     Buffer(u32),
+    /// Half floats in a bound buffer. In registers they are floats.
+    Halves(u32),
 }
 
 /// A value with a name given by the API.
@@ -162,6 +166,67 @@ pub(crate) enum BuiltIn {
     GlobalId(u8),
     WorkgroupId(u8),
     WorkgroupCount(u8),
+    SubgroupSize,
+    SubgroupCount,
+    SubgroupId,
+    /// Index in the subgroup.
+    SubgroupLane,
+}
+
+/// How values of a subgroup become one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Fold {
+    pub(crate) op: Binary,
+    /// For no values.
+    pub(crate) identity: u32,
+    /// Whether each step rounds to half floats.
+    pub(crate) is_half: bool,
+}
+
+/// What the active invocations of a subgroup do together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Subgroup {
+    /// A word of the bits of those whose value is true.
+    Ballot(u8),
+    Reduce(Fold),
+    Inclusive(Fold),
+    Exclusive(Fold),
+    BroadcastFirst,
+    /// The value of the invocation at an index of the subgroup.
+    Shuffle,
+    ShuffleXor,
+    ShuffleUp,
+    ShuffleDown,
+    /// The value of the invocation at an index of each four.
+    QuadBroadcast,
+}
+
+/// Where the level of detail of a sample comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum SampleLod {
+    Exact(Operand),
+    /// Derivatives of both coordinates along `x`, then along `y`.
+    Gradient([Operand; 4]),
+}
+
+/// A texture looked up with a sampler.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Sample {
+    /// The components that are wanted.
+    pub(crate) to: [Option<u32>; 4],
+    pub(crate) texture: u32,
+    pub(crate) sampler: u32,
+    pub(crate) at: [Operand; 2],
+    /// In texels.
+    pub(crate) offset: [i32; 2],
+    pub(crate) lod: SampleLod,
+    /// What texels are compared with.
+    pub(crate) reference: Option<Operand>,
+    /// The component of four texels that is wanted rather than a filtered value.
+    pub(crate) gather: Option<usize>,
+    /// Whether the coordinate stays half a texel inside.
+    pub(crate) clamp_to_edge: bool,
+    pub(crate) mask: Option<u32>,
 }
 
 /// One instruction. `mask` is a lane register with all ones for the invocations that take part; none means all.
@@ -242,14 +307,17 @@ pub(crate) enum Op {
     },
     Atomic {
         op: Atomic,
+        /// The value before.
         to: Option<u32>,
         memory: Memory,
         address: Operand,
         offset: u32,
         a: Operand,
+        /// The value that memory must hold for an exchange to happen.
+        compare: Option<Operand>,
         mask: Option<u32>,
     },
-    /// Number of elements of a runtime-sized array.
+    /// Number of elements of a runtime-sized array; offset and stride in bytes.
     ArrayLength {
         to: Operand,
         buffer: u32,
@@ -266,6 +334,7 @@ pub(crate) enum Op {
         /// Only for checks.
         mask: Option<u32>,
     },
+    TextureSample(Box<Sample>),
     TextureStore {
         texture: u32,
         x: Operand,
@@ -282,9 +351,18 @@ pub(crate) enum Op {
         to: Operand,
         texture: u32,
     },
+    Subgroup {
+        op: Subgroup,
+        to: u32,
+        a: Operand,
+        index: Operand,
+        mask: Option<u32>,
+    },
     /// All invocations are always at the same instruction: only checks look at it.
     Barrier {
         mask: Option<u32>,
+        /// Whether it orders accesses to workgroup memory.
+        orders_workgroup: bool,
     },
     Jump {
         to: usize,

@@ -39,6 +39,21 @@ impl Buffer {
         self.words.get(address as usize).map_or(0, |word| word.load(Ordering::Relaxed))
     }
 
+    /// The half of a word at an address in halves.
+    pub(crate) fn get_half(&self, address: u32) -> u32 {
+        self.get(address / 2) >> (16 * (address % 2)) & 0xffff
+    }
+
+    /// Leaves the other half as it is, whoever writes it meanwhile.
+    pub(crate) fn set_half(&self, address: u32, half: u32) {
+        if let Some(word) = self.words.get(address as usize / 2) {
+            let shift = 16 * (address % 2);
+            let replaced = |old: u32| Some(old & !(0xffff << shift) | half << shift);
+            // The update never declines.
+            let _ = word.fetch_update(Ordering::Relaxed, Ordering::Relaxed, replaced);
+        }
+    }
+
     pub(crate) fn set(&self, address: u32, value: u32) {
         if let Some(word) = self.words.get(address as usize) {
             word.store(value, Ordering::Relaxed);
@@ -194,7 +209,7 @@ pub(crate) struct Level {
     pub(crate) height: u32,
 }
 
-/// A two-dimensional texture.
+/// A two-dimensional texture. A depth texture of a kernel looks at its first component.
 #[derive(Debug)]
 pub struct Texture {
     format: TexelFormat,
@@ -213,7 +228,7 @@ impl Texture {
         let mut levels = Vec::new();
         let mut count = 0;
         for level in 0..level_count.max(1) {
-            let (width, height) = ((width >> level).max(1), (height >> level).max(1));
+            let [width, height] = [width, height].map(|size| size.checked_shr(level).unwrap_or(0).max(1));
             levels.push(Level { first_word: count as u32, width, height });
             count += width as usize * height as usize * format.words();
         }
@@ -228,6 +243,24 @@ impl Texture {
     /// Width and height of the first level.
     pub fn size(&self) -> [u32; 2] {
         [self.levels[0].width, self.levels[0].height]
+    }
+
+    /// Where a texel inside of a level begins, in words.
+    pub(crate) fn first_word(&self, level: &Level, x: u32, y: u32) -> u32 {
+        level.first_word + (y * level.width + x) * self.format.words() as u32
+    }
+
+    /// The components of the texel that begins at a word, as bits; those that the format lacks are 0, or 1 for alpha.
+    pub(crate) fn texel(&self, first_word: u32) -> [u32; 4] {
+        let channel = self.format.channel();
+        [0, 1, 2, 3].map(|component| {
+            if component >= self.format.components() {
+                return if component == 3 { channel.one() } else { 0 };
+            }
+            let (offset, shift) = self.format.position(component);
+            let word = self.words.get(first_word as usize + offset);
+            channel.decode(word.map_or(0, |word| word.load(Ordering::Relaxed)) >> shift)
+        })
     }
 
     /// Replaces the first words, texel by texel and row by row, levels one after another.

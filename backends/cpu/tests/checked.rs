@@ -35,6 +35,8 @@ fn a_barrier_between_write_and_read_is_needed() {
     let with = format!("shared_words[lane] = lane;\nworkgroupBarrier();\n{exchange}");
     let without = format!("shared_words[lane] = lane;\n{exchange}");
     assert_eq!(kinds(&with), []);
+    let load = format!("shared_words[lane] = lane;\nlet all = workgroupUniformLoad(&shared_words[5]);\n{exchange}");
+    assert_eq!(kinds(&load), []);
     let found = faults(&without);
     assert_eq!(found.len(), 1);
     assert_eq!((found[0].0.kind, found[0].0.invocation, found[0].0.count), (FaultKind::Race, 0, 64));

@@ -16,18 +16,62 @@ fn unknown_entry_points_are_named() {
     assert!(compile(source, "main").is_ok());
 }
 
+/// Compiles a source with something unsupported on the line that ends with `// here`; the message.
+fn unsupported(source: &str) -> String {
+    match compile(source, "main") {
+        Err(error @ CompileError::Unsupported { offset: Some(offset), .. }) => {
+            let place = naga::Span::new(offset as u32, offset as u32).location(source);
+            let line = source.lines().nth(place.line_number as usize - 1).unwrap();
+            assert!(line.ends_with("// here"), "{error} at {line}");
+            error.to_string()
+        }
+        other => panic!("{other:?}\n{source}"),
+    }
+}
+
 #[test]
-fn what_is_not_supported_is_named() {
-    for (declaration, body, name) in [
-        ("@group(0) @binding(0) var sky: texture_cube<f32>;", "", "sky"),
-        ("@group(0) @binding(0) var layers: texture_2d_array<f32>;", "", "layers"),
-        ("@group(0) @binding(0) var volume: texture_3d<f32>;", "", "volume"),
-        ("override factor: u32;", "let x = factor;", "override"),
+fn declarations_that_are_not_supported_are_named_with_their_line() {
+    for (declaration, name) in [
+        ("@group(0) @binding(0) var sky: texture_cube<f32>;", "sky"),
+        ("@group(0) @binding(0) var layers: texture_2d_array<f32>;", "layers"),
+        ("@group(0) @binding(0) var volume: texture_3d<f32>;", "volume"),
+        ("override factor: u32;", "override"),
     ] {
-        let source = format!("{declaration} @compute @workgroup_size(1) fn main() {{ {body} }}");
-        match compile(&source, "main") {
-            Err(CompileError::Unsupported { construct }) => assert!(construct.contains(name), "{construct}"),
-            other => panic!("{declaration}: {other:?}"),
+        let source = format!("// A comment.\n\n{declaration} // here\n\n@compute @workgroup_size(1) fn main() {{}}");
+        assert!(unsupported(&source).contains(name), "{declaration}");
+    }
+}
+
+#[test]
+fn code_that_is_not_supported_is_named_with_its_line() {
+    for (line, name) in [
+        ("var wide: u64;", "64"),
+        ("let wide = u64(i);", "64"),
+        ("out[1] = u32(5lu + u64(i));", "64"),
+        ("if f64(i) < 2.0 {}", "64"),
+        ("for (var k = 0lu; k < 2lu; k++) {}", "64"),
+        ("out[1] = u32(wide_numbers[i].x);", "64"),
+    ] {
+        for (body, function) in [(line, "let x = i;"), ("helper(i);", line)] {
+            let mark = |code: &str| if code == line { format!("{code} // here") } else { code.to_owned() };
+            let source = format!(
+                "@group(0) @binding(0) var<storage, read_write> out: array<u32>;
+                @group(0) @binding(1) var<storage> wide_numbers: array<vec2<i64>>;
+                fn helper(i: u32) {{
+                    out[2] = i;
+                    {}
+                }}
+                @compute @workgroup_size(64) fn main(@builtin(local_invocation_index) i: u32) {{
+                    out[0] = i;
+                    if i < 3u {{
+                        {}
+                    }}
+                }}",
+                mark(function),
+                mark(body),
+            );
+            let message = unsupported(&source);
+            assert!(message.contains(name), "{line}: {message}");
         }
     }
 }

@@ -17,7 +17,7 @@ fn runner(cases: u32) -> TestRunner {
 
 #[test]
 fn random_programs_give_the_same_bits() {
-    let Some(gpu) = Gpu::open() else { return };
+    let Some(gpu) = Gpu::open(wgpu::Features::empty()) else { return };
     let numbers = [0, 6, 0, 0];
     let run = |(bytes, argument): (Vec<u8>, usize)| {
         let program = Generator::program(&bytes, Floats::Exact);
@@ -104,7 +104,7 @@ fn run_both(
 
 #[test]
 fn integer_functions_give_the_same_bits() {
-    let Some(gpu) = Gpu::open() else { return };
+    let Some(gpu) = Gpu::open(wgpu::Features::empty()) else { return };
     let common = [
         "a + b * c - d",
         "a / b",
@@ -156,7 +156,7 @@ fn equal_floats(input: [u32; 4], cpu: u32, device: u32) -> bool {
 
 #[test]
 fn exact_float_functions_give_the_same_bits() {
-    let Some(gpu) = Gpu::open() else { return };
+    let Some(gpu) = Gpu::open(wgpu::Features::empty()) else { return };
     let expressions = [
         "a + b",
         "a - b",
@@ -189,7 +189,7 @@ fn exact_float_functions_give_the_same_bits() {
 
 #[test]
 fn float_functions_agree_within_what_wgsl_allows() {
-    let Some(gpu) = Gpu::open() else { return };
+    let Some(gpu) = Gpu::open(wgpu::Features::empty()) else { return };
     // Expression, inputs it is defined for, and the error of each side: units in the last place or absolute.
     type Function = (&'static str, fn(f32, f32) -> bool, fn(f32) -> f32, f32);
     let functions: [Function; 21] = [
@@ -230,7 +230,7 @@ fn float_functions_agree_within_what_wgsl_allows() {
 
 #[test]
 fn packing_gives_the_same_bits() {
-    let Some(gpu) = Gpu::open() else { return };
+    let Some(gpu) = Gpu::open(wgpu::Features::empty()) else { return };
     let floats = [
         "pack4x8unorm(vec4(a, b, c, d))",
         "pack4x8snorm(vec4(a, b, c, d))",

@@ -1,118 +1,11 @@
 //! Expressions: values as registers, one a scalar.
 
-use std::collections::HashMap;
+use naga::{Expression, Handle, RelationalFunction, ScalarKind, TypeInner, UnaryOperator};
 
-use naga::{Expression, Function, Handle, RelationalFunction, ScalarKind, TypeInner, UnaryOperator};
-
+use super::uses::operands;
 use super::{Compiler, Inlined, Result, Root, Value, unsupported};
-use crate::layout::{element_count, part, scalar_count};
+use crate::layout::{element_count, is_supported, part, scalar_count};
 use crate::op::{Binary, Op, Operand, Unary};
-
-/// The expressions that an expression is made of.
-fn operands(expression: &Expression, mut visit: impl FnMut(Handle<Expression>)) {
-    match expression {
-        Expression::Compose { components, .. } => components.iter().copied().for_each(visit),
-        Expression::Access { base, index } => [*base, *index].into_iter().for_each(visit),
-        Expression::AccessIndex { base, .. } => visit(*base),
-        Expression::Splat { value, .. } => visit(*value),
-        Expression::Swizzle { vector, .. } => visit(*vector),
-        Expression::Load { pointer } => visit(*pointer),
-        Expression::ImageLoad { coordinate, level, .. } => {
-            visit(*coordinate);
-            level.iter().copied().for_each(visit);
-        }
-        Expression::ImageQuery { query: naga::ImageQuery::Size { level: Some(level) }, .. } => visit(*level),
-        Expression::Unary { expr, .. } | Expression::As { expr, .. } => visit(*expr),
-        Expression::Binary { left, right, .. } => [*left, *right].into_iter().for_each(visit),
-        Expression::Select { condition, accept, reject } => [*condition, *accept, *reject].into_iter().for_each(visit),
-        Expression::Relational { argument, .. } => visit(*argument),
-        Expression::Math { arg, arg1, arg2, arg3, .. } => {
-            [Some(*arg), *arg1, *arg2, *arg3].into_iter().flatten().for_each(visit);
-        }
-        Expression::ArrayLength(pointer) => visit(*pointer),
-        _ => {}
-    }
-}
-
-fn visit_statements(block: &naga::Block, visit: &mut impl FnMut(&naga::Statement)) {
-    for statement in block {
-        visit(statement);
-        match statement {
-            naga::Statement::Block(inner) => visit_statements(inner, visit),
-            naga::Statement::If { accept, reject, .. } => {
-                visit_statements(accept, visit);
-                visit_statements(reject, visit);
-            }
-            naga::Statement::Loop { body, continuing, .. } => {
-                visit_statements(body, visit);
-                visit_statements(continuing, visit);
-            }
-            naga::Statement::Switch { cases, .. } => {
-                cases.iter().for_each(|case| visit_statements(&case.body, visit));
-            }
-            _ => {}
-        }
-    }
-}
-
-/// How often the value of each expression is asked for.
-pub(super) fn count_uses(function: &Function) -> Vec<u32> {
-    let mut uses = vec![0; function.expressions.len()];
-    let mut count = |handle: Handle<Expression>| uses[handle.index()] += 1;
-    visit_statements(&function.body, &mut |statement| match statement {
-        naga::Statement::Emit(range) => {
-            range.clone().for_each(|handle| operands(&function.expressions[handle], &mut count));
-        }
-        naga::Statement::If { condition, .. } => count(*condition),
-        naga::Statement::Switch { selector, .. } => count(*selector),
-        naga::Statement::Loop { break_if: Some(condition), .. } => count(*condition),
-        naga::Statement::Return { value: Some(value) } => count(*value),
-        naga::Statement::Store { pointer, value } => [*pointer, *value].into_iter().for_each(&mut count),
-        naga::Statement::ImageStore { coordinate, value, .. } => [*coordinate, *value].into_iter().for_each(&mut count),
-        naga::Statement::Atomic { pointer, value, .. } => [*pointer, *value].into_iter().for_each(&mut count),
-        naga::Statement::Call { arguments, .. } => arguments.iter().copied().for_each(&mut count),
-        _ => {}
-    });
-    uses
-}
-
-/// Which components of each texel are looked at.
-pub(super) fn wanted_components(function: &Function) -> HashMap<Handle<Expression>, [bool; 4]> {
-    let mut wanted: HashMap<_, [bool; 4]> = HashMap::new();
-    let is_load = |handle: &Handle<Expression>| matches!(function.expressions[*handle], Expression::ImageLoad { .. });
-    for (_, expression) in function.expressions.iter() {
-        match expression {
-            Expression::AccessIndex { base, index } if is_load(base) => {
-                wanted.entry(*base).or_default()[(*index as usize).min(3)] = true;
-            }
-            Expression::Swizzle { size, vector, pattern } if is_load(vector) => {
-                let components = wanted.entry(*vector).or_default();
-                pattern[..*size as usize].iter().for_each(|component| components[*component as usize] = true);
-            }
-            other => operands(other, |handle| {
-                if is_load(&handle) {
-                    wanted.insert(handle, [true; 4]);
-                }
-            }),
-        }
-    }
-    visit_statements(&function.body, &mut |statement| {
-        let mut all = |handle: Handle<Expression>| {
-            if is_load(&handle) {
-                wanted.insert(handle, [true; 4]);
-            }
-        };
-        match statement {
-            naga::Statement::Return { value: Some(value) } => all(*value),
-            naga::Statement::Store { value, .. }
-            | naga::Statement::ImageStore { value, .. }
-            | naga::Statement::Atomic { value, .. } => all(*value),
-            naga::Statement::Call { arguments, .. } => arguments.iter().copied().for_each(all),
-            _ => {}
-        }
-    });
-    wanted
-}
 
 impl<'a> Compiler<'a> {
     pub(super) fn inner(&self, frame: &Inlined<'a>, handle: Handle<Expression>) -> TypeInner {
@@ -122,8 +15,9 @@ impl<'a> Compiler<'a> {
     /// Kind of scalar that a value is made of.
     pub(super) fn kind(&self, frame: &Inlined<'a>, handle: Handle<Expression>) -> Result<ScalarKind> {
         match self.inner(frame, handle).scalar() {
-            Some(naga::Scalar { kind, width }) if width == 4 || kind == ScalarKind::Bool => Ok(kind),
-            other => unsupported(format!("arithmetic on {other:?}")),
+            Some(scalar) if is_supported(scalar) => Ok(scalar.kind),
+            Some(scalar) => unsupported(super::number_name(scalar)),
+            None => unsupported("arithmetic on what is no number"),
         }
     }
 
@@ -163,7 +57,7 @@ impl<'a> Compiler<'a> {
         }
         let constants = |bits: Vec<u32>| bits.into_iter().map(Operand::Const).collect();
         match &frame.function.expressions[handle] {
-            Expression::Literal(literal) => Ok(vec![Operand::Const(super::literal_bits(*literal)?)]),
+            Expression::Literal(literal) => Ok(vec![Operand::Const(super::globals::literal_bits(*literal)?)]),
             Expression::Constant(constant) => self.constant(self.module.constants[*constant].init).map(constants),
             Expression::ZeroValue(ty) => {
                 let count = self.count(&self.module.types[*ty].inner.clone())?;
@@ -193,7 +87,7 @@ impl<'a> Compiler<'a> {
     pub(super) fn argument_value(&mut self, frame: &mut Inlined<'a>, handle: Handle<Expression>) -> Result<Value> {
         match self.inner(frame, handle) {
             TypeInner::Pointer { .. } | TypeInner::ValuePointer { .. } => Ok(Value::Place(self.place(frame, handle)?)),
-            TypeInner::Image { .. } => Ok(Value::Texture(self.texture(frame, handle)?)),
+            TypeInner::Image { .. } | TypeInner::Sampler { .. } => Ok(Value::Resource(self.resource(frame, handle)?)),
             _ => {
                 let operands = self.data(frame, handle)?;
                 self.retain(&operands);
@@ -286,40 +180,9 @@ impl<'a> Compiler<'a> {
                 }
                 self.load(&place)
             }
-            Expression::ImageLoad { image, coordinate, array_index: None, sample: None, level } => {
-                let texture = self.texture(frame, *image)?;
-                let at = self.data(frame, *coordinate)?;
-                let level = match level {
-                    Some(level) => self.data(frame, *level)?[0],
-                    None => Operand::Const(0),
-                };
-                let wanted = frame.wanted_components.get(&handle).copied().unwrap_or([false; 4]);
-                let to = wanted.map(|wanted| wanted.then(|| self.registers.allocate()));
-                let y = at.get(1).copied().unwrap_or(Operand::Const(0));
-                self.emit(Op::TextureLoad { to, texture, x: at[0], y, level, mask: self.mask });
-                let count = self.count(&self.inner(frame, handle))? as usize;
-                Ok(to[..count].iter().map(|to| to.map_or(Operand::Const(0), Operand::Lane)).collect())
-            }
-            Expression::ImageQuery { image, query } => {
-                let texture = self.texture(frame, *image)?;
-                match query {
-                    naga::ImageQuery::Size { level } => {
-                        let level = match level {
-                            Some(level) => self.data(frame, *level)?[0],
-                            None => Operand::Const(0),
-                        };
-                        let to = [self.result(&[level]), self.result(&[level])];
-                        self.emit(Op::TextureSize { to, texture, level });
-                        Ok(to.to_vec())
-                    }
-                    naga::ImageQuery::NumLevels => {
-                        let to = self.scalar();
-                        self.emit(Op::TextureLevels { to, texture });
-                        Ok(vec![to])
-                    }
-                    other => unsupported(format!("image query {other:?}")),
-                }
-            }
+            Expression::ImageLoad { .. } => self.image_load(frame, handle),
+            Expression::ImageSample { .. } => self.image_sample(frame, handle),
+            Expression::ImageQuery { image, query } => self.image_query(frame, *image, *query),
             Expression::Unary { op, expr } => {
                 let kind = self.kind(frame, *expr)?;
                 let op = match (op, kind) {
@@ -330,7 +193,10 @@ impl<'a> Compiler<'a> {
                 let values = self.data(frame, *expr)?;
                 Ok(values.into_iter().map(|value| self.unary(op, value)).collect())
             }
-            Expression::Binary { op, left, right } => self.binary_expression(frame, *op, *left, *right),
+            Expression::Binary { op, left, right } => {
+                let values = self.binary_expression(frame, *op, *left, *right)?;
+                Ok(self.rounded(frame, handle, values))
+            }
             Expression::Select { condition, accept, reject } => {
                 let condition = self.data(frame, *condition)?;
                 let accept = self.data(frame, *accept)?;
@@ -354,16 +220,15 @@ impl<'a> Compiler<'a> {
                 for handle in [Some(*arg), *arg1, *arg2, *arg3].into_iter().flatten() {
                     arguments.push(self.data(frame, handle)?);
                 }
-                self.math(*fun, kind, &inner, &arguments)
+                let values = self.math(*fun, kind, &inner, &arguments)?;
+                Ok(self.rounded(frame, handle, values))
             }
             Expression::As { expr, kind, convert } => {
                 let values = self.data(frame, *expr)?;
                 let from = self.kind(frame, *expr)?;
+                self.kind(frame, handle)?;
                 let op = match (from, kind, convert) {
                     (_, _, None) => Unary::Copy,
-                    (_, _, Some(width)) if *width != 4 && *kind != ScalarKind::Bool => {
-                        return unsupported(format!("conversion to {kind:?} of {width} bytes"));
-                    }
                     (ScalarKind::Sint, ScalarKind::Float, _) => Unary::IntToFloat,
                     (ScalarKind::Uint, ScalarKind::Float, _) => Unary::UintToFloat,
                     (ScalarKind::Float, ScalarKind::Sint, _) => Unary::FloatToInt,
@@ -376,13 +241,27 @@ impl<'a> Compiler<'a> {
                 };
                 if op == Unary::Copy {
                     self.retain(&values);
-                    return Ok(values);
+                    return Ok(self.rounded(frame, handle, values));
                 }
-                Ok(values.into_iter().map(|value| self.unary(op, value)).collect())
+                let values = values.into_iter().map(|value| self.unary(op, value)).collect();
+                Ok(self.rounded(frame, handle, values))
             }
             Expression::ArrayLength(pointer) => self.array_length(frame, *pointer),
             other => unsupported(format!("expression {other:?}")),
         }
+    }
+
+    /// What arithmetic in single precision gave, rounded if it is to be half floats. Takes over the references.
+    fn rounded(&mut self, frame: &Inlined<'a>, handle: Handle<Expression>, values: Vec<Operand>) -> Vec<Operand> {
+        if self.inner(frame, handle).scalar() != Some(naga::Scalar::F16) {
+            return values;
+        }
+        let round = |value| {
+            let rounded = self.unary(Unary::QuantizeToF16, value);
+            self.release(&[value]);
+            rounded
+        };
+        values.into_iter().map(round).collect()
     }
 
     pub(super) fn reduce(&mut self, op: Binary, values: &[Operand]) -> Operand {

@@ -3,22 +3,16 @@
 use naga::{AtomicFunction, Expression, Handle, ScalarKind, TypeInner};
 
 use super::{Compiler, Inlined, Place, Result, Root, Value, unsupported};
-use crate::layout::{element_count, part};
+use crate::layout::{element_count, part, scalar_count};
 use crate::op::{Atomic, Binary, Memory, Op, Operand};
 
-impl<'a> Compiler<'a> {
-    pub(super) fn texture(&mut self, frame: &Inlined<'a>, handle: Handle<Expression>) -> Result<u32> {
-        let value = match &frame.function.expressions[handle] {
-            Expression::GlobalVariable(global) => self.globals.get(global),
-            Expression::FunctionArgument(index) => frame.arguments.get(*index as usize),
-            _ => None,
-        };
-        match value {
-            Some(Value::Texture(texture)) => Ok(*texture),
-            _ => unsupported("a texture that is no global variable"),
-        }
+impl Place {
+    fn is_in_buffer(&self) -> bool {
+        matches!(self.root, Root::Memory(Memory::Buffer(_)))
     }
+}
 
+impl<'a> Compiler<'a> {
     /// What a pointer points to.
     pub(super) fn place(&mut self, frame: &mut Inlined<'a>, handle: Handle<Expression>) -> Result<Place> {
         if let Some(Value::Place(place)) = &frame.values[handle.index()] {
@@ -27,7 +21,7 @@ impl<'a> Compiler<'a> {
         match &frame.function.expressions[handle] {
             Expression::GlobalVariable(global) => match self.globals.get(global) {
                 Some(Value::Place(place)) => Ok(place.clone()),
-                _ => unsupported("a pointer to a texture"),
+                _ => unsupported("a pointer to a texture or sampler"),
             },
             Expression::LocalVariable(local) => {
                 let inner = self.module.types[frame.function.local_variables[*local].ty].inner.clone();
@@ -52,7 +46,7 @@ impl<'a> Compiler<'a> {
                 let Some(second) = part(self.module, &place.inner, 1) else {
                     return unsupported(format!("an index into {:?}", place.inner));
                 };
-                let stride = if matches!(place.root, Root::Variable(_)) { second.scalars } else { second.words };
+                let stride = if place.is_in_buffer() { second.bytes } else { second.scalars };
                 place.dynamic.push((index, stride, element_count(&place.inner)));
                 place.inner = second.inner;
                 Ok(place)
@@ -65,21 +59,44 @@ impl<'a> Compiler<'a> {
         let Some(part) = part(self.module, &place.inner, index) else {
             return unsupported(format!("a part of {:?}", place.inner));
         };
-        place.offset += if matches!(place.root, Root::Variable(_)) { part.scalars } else { part.words };
+        place.offset += if place.is_in_buffer() { part.bytes } else { part.scalars };
         place.inner = part.inner;
         Ok(place)
     }
 
-    /// The dynamic part of an address, in words.
-    fn address(&mut self, place: &Place) -> Operand {
+    /// The dynamic part of an address, in units of so many bytes or scalars.
+    fn address(&mut self, place: &Place, unit: u32) -> Operand {
         let mut address = Operand::Const(0);
         for &(index, stride, _) in &place.dynamic {
-            let scaled = self.binary(Binary::MulI, index, Operand::Const(stride));
+            let scaled = self.binary(Binary::MulI, index, Operand::Const(stride / unit));
             let sum = self.binary(Binary::AddI, address, scaled);
             self.release(&[address, scaled]);
             address = sum;
         }
         address
+    }
+
+    /// Where each scalar of a place in memory is: memory, dynamic and fixed part of the address. The dynamic parts
+    /// are to be released: those of words and of half words.
+    fn addresses(&mut self, place: &Place, memory: Memory) -> (Vec<(Memory, Operand, u32)>, [Operand; 2]) {
+        let Memory::Buffer(buffer) = memory else {
+            let address = self.address(place, 1);
+            let count = scalar_count(self.module, &place.inner).unwrap_or(0);
+            let all = (0..count).map(|scalar| (memory, address, place.offset + scalar)).collect();
+            return (all, [address, Operand::Const(0)]);
+        };
+        let mut slots = Vec::new();
+        crate::layout::slots(self.module, &place.inner, place.offset, &mut slots);
+        let of = |compiler: &mut Self, half: bool| match slots.iter().any(|slot| slot.is_half == half) {
+            true => compiler.address(place, if half { 2 } else { 4 }),
+            false => Operand::Const(0),
+        };
+        let [words, halves] = [false, true].map(|half| of(self, half));
+        let all = slots.iter().map(|slot| match slot.is_half {
+            true => (Memory::Halves(buffer), halves, slot.offset / 2),
+            false => (memory, words, slot.offset / 4),
+        });
+        (all.collect(), [words, halves])
     }
 
     /// Index into the registers of a variable, distance between elements, and number of elements. The index has a
@@ -100,28 +117,28 @@ impl<'a> Compiler<'a> {
     }
 
     pub(super) fn load(&mut self, place: &Place) -> Result<Vec<Operand>> {
-        let offsets = self.offsets(&place.inner);
+        self.count(&place.inner)?;
         match place.root {
             Root::Memory(memory) => {
-                let address = self.address(place);
-                if let TypeInner::Atomic(_) = place.inner {
-                    // atomicLoad
-                    let value = self.atomic_op(Atomic::Or, memory, address, place.offset, Operand::Const(0), true);
-                    self.release(&[address]);
-                    return Ok(value.into_iter().collect());
-                }
+                let (addresses, parts) = self.addresses(place, memory);
                 // Only constant buffers hold the same for all: others change while the kernel runs.
                 let uniform = self.is_constant(memory);
-                let values = offsets
-                    .iter()
-                    .map(|offset| {
-                        let to =
-                            if uniform { self.result(&[address]) } else { Operand::Lane(self.registers.allocate()) };
-                        self.emit(Op::Load { to, memory, address, offset: place.offset + offset, mask: self.mask });
-                        to
-                    })
-                    .collect();
-                self.release(&[address]);
+                let load = |compiler: &mut Self, (memory, address, offset): (Memory, Operand, u32)| {
+                    if let TypeInner::Atomic(_) = place.inner {
+                        let to = compiler.registers.allocate();
+                        let zero = Operand::Const(0);
+                        compiler.atomic_op(Atomic::Load, Some(to), (memory, address, offset), zero, None);
+                        return Operand::Lane(to);
+                    }
+                    let to = match uniform {
+                        true => compiler.result(&[address]),
+                        false => Operand::Lane(compiler.registers.allocate()),
+                    };
+                    compiler.emit(Op::Load { to, memory, address, offset, mask: compiler.mask });
+                    to
+                };
+                let values = addresses.into_iter().map(|address| load(self, address)).collect();
+                self.release(&parts);
                 Ok(values)
             }
             Root::Variable(variable) => {
@@ -142,7 +159,9 @@ impl<'a> Compiler<'a> {
 
     fn is_constant(&self, memory: Memory) -> bool {
         match memory {
-            Memory::Buffer(slot) => self.bindings[slot as usize].kind == super::SlotKind::Buffer { writable: false },
+            Memory::Buffer(slot) | Memory::Halves(slot) => {
+                self.bindings[slot as usize].kind == super::SlotKind::Buffer { writable: false }
+            }
             Memory::Workgroup => false,
         }
     }
@@ -150,18 +169,15 @@ impl<'a> Compiler<'a> {
     pub(super) fn store(&mut self, place: &Place, operands: &[Operand]) -> Result<()> {
         match place.root {
             Root::Memory(memory) => {
-                let address = self.address(place);
-                if let (TypeInner::Atomic(_), [a]) = (&place.inner, operands) {
-                    // atomicStore
-                    self.atomic_op(Atomic::Exchange, memory, address, place.offset, *a, false);
-                    self.release(&[address]);
-                    return Ok(());
+                let (addresses, parts) = self.addresses(place, memory);
+                for ((memory, address, offset), &a) in addresses.into_iter().zip(operands) {
+                    if let TypeInner::Atomic(_) = place.inner {
+                        self.atomic_op(Atomic::Store, None, (memory, address, offset), a, None);
+                    } else {
+                        self.emit(Op::Store { memory, address, offset, a, mask: self.mask });
+                    }
                 }
-                let offsets = self.offsets(&place.inner);
-                for (offset, &a) in offsets.iter().zip(operands) {
-                    self.emit(Op::Store { memory, address, offset: place.offset + offset, a, mask: self.mask });
-                }
-                self.release(&[address]);
+                self.release(&parts);
             }
             Root::Variable(variable) if place.dynamic.is_empty() => {
                 for (scalar, &operand) in operands.iter().enumerate() {
@@ -189,6 +205,7 @@ impl<'a> Compiler<'a> {
         Ok(())
     }
 
+    /// The value before, if it is wanted, and for a conditional exchange whether it happened.
     pub(super) fn atomic(
         &mut self,
         frame: &mut Inlined<'a>,
@@ -196,7 +213,7 @@ impl<'a> Compiler<'a> {
         function: AtomicFunction,
         value: Handle<Expression>,
         wanted: bool,
-    ) -> Result<Option<Operand>> {
+    ) -> Result<Vec<Operand>> {
         let place = self.place(frame, pointer)?;
         let Root::Memory(memory) = place.root else { return unsupported("an atomic variable of a function") };
         let signed = matches!(place.inner, TypeInner::Atomic(scalar) if scalar.kind == ScalarKind::Sint);
@@ -220,30 +237,37 @@ impl<'a> Compiler<'a> {
                     Atomic::MaxU
                 }
             }
-            AtomicFunction::Exchange { compare: None } => Atomic::Exchange,
-            AtomicFunction::Exchange { compare: Some(_) } => return unsupported("atomicCompareExchangeWeak"),
+            AtomicFunction::Exchange { .. } => Atomic::Exchange,
         };
         let a = self.data(frame, value)?[0];
-        let address = self.address(&place);
-        let old = self.atomic_op(op, memory, address, place.offset, a, wanted);
-        self.release(&[address]);
+        let condition = if let AtomicFunction::Exchange { compare } = function { compare } else { None };
+        let compare = condition.map(|handle| self.data(frame, handle)).transpose()?.map(|operands| operands[0]);
+        let (addresses, parts) = self.addresses(&place, memory);
+        let to = wanted.then(|| self.registers.allocate());
+        for address in addresses {
+            self.atomic_op(op, to, address, a, compare);
+        }
+        self.release(&parts);
+        let mut results: Vec<_> = to.into_iter().map(Operand::Lane).collect();
+        if let (Some(compare), Some(&old)) = (compare, results.first()) {
+            results.push(self.binary(Binary::EqI, old, compare));
+        }
         self.used(frame, value);
-        Ok(old)
+        if let Some(handle) = condition {
+            self.used(frame, handle);
+        }
+        Ok(results)
     }
 
-    /// The value before, if it is wanted.
     fn atomic_op(
         &mut self,
         op: Atomic,
-        memory: Memory,
-        address: Operand,
-        offset: u32,
+        to: Option<u32>,
+        (memory, address, offset): (Memory, Operand, u32),
         a: Operand,
-        wanted: bool,
-    ) -> Option<Operand> {
-        let to = wanted.then(|| self.registers.allocate());
-        self.emit(Op::Atomic { op, to, memory, address, offset, a, mask: self.mask });
-        to.map(Operand::Lane)
+        compare: Option<Operand>,
+    ) {
+        self.emit(Op::Atomic { op, to, memory, address, offset, a, compare, mask: self.mask });
     }
 
     pub(super) fn array_length(
@@ -255,7 +279,7 @@ impl<'a> Compiler<'a> {
         match (&place.root, &place.inner) {
             (Root::Memory(Memory::Buffer(buffer)), TypeInner::Array { stride, .. }) => {
                 let to = self.scalar();
-                self.emit(Op::ArrayLength { to, buffer: *buffer, offset: place.offset, stride: stride / 4 });
+                self.emit(Op::ArrayLength { to, buffer: *buffer, offset: place.offset, stride: *stride });
                 Ok(vec![to])
             }
             _ => unsupported("arrayLength of what is no buffer"),

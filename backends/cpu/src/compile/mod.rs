@@ -7,16 +7,23 @@
 
 mod expression;
 mod flow;
+mod function;
+mod globals;
+mod image;
+mod loops;
 mod math;
 mod memory;
+mod packing;
+mod subgroup;
+mod uses;
 
 use std::collections::{HashMap, HashSet};
 
 use naga::valid::{FunctionInfo, ModuleInfo};
-use naga::{AddressSpace, Expression, Function, GlobalVariable, Handle, LocalVariable, Module, TypeInner};
+use naga::{Expression, Function, GlobalVariable, Handle, LocalVariable, Module, TypeInner};
 
 use crate::error::CompileError;
-use crate::layout::{scalar_count, word_offsets};
+use crate::layout::scalar_count;
 use crate::op::{Binary, Memory, Op, Operand, Unary};
 use crate::registers::Registers;
 
@@ -32,7 +39,14 @@ pub(crate) struct BindingSlot {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SlotKind {
     Buffer { writable: bool },
-    Texture,
+    Texture { writable: bool },
+    Sampler { comparison: bool },
+}
+
+impl SlotKind {
+    pub(crate) fn is_writable(self) -> bool {
+        matches!(self, Self::Buffer { writable: true } | Self::Texture { writable: true })
+    }
 }
 
 /// A kernel ready to run.
@@ -46,6 +60,8 @@ pub(crate) struct Code {
     pub(crate) tables: Vec<Vec<u32>>,
     pub(crate) workgroup_words: u32,
     pub(crate) workgroup_size: [u32; 3],
+    /// A divisor of `LANES`.
+    pub(crate) subgroup_size: u32,
     pub(crate) bindings: Vec<BindingSlot>,
 }
 
@@ -77,7 +93,7 @@ enum Root {
 struct Place {
     root: Root,
     inner: TypeInner,
-    /// From the root: scalars in a variable, words in memory.
+    /// From the root: bytes in a buffer, scalars elsewhere. Distances too.
     offset: u32,
     /// Index, distance between elements, and number of elements where it is known.
     dynamic: Vec<(Operand, u32, Option<u32>)>,
@@ -87,7 +103,8 @@ struct Place {
 enum Value {
     Data(Vec<Operand>),
     Place(Place),
-    Texture(u32),
+    /// A texture or sampler, by its binding.
+    Resource(u32),
 }
 
 /// One function at one place that it is called from.
@@ -148,7 +165,8 @@ struct Compiler<'a> {
 type Result<T> = std::result::Result<T, CompileError>;
 
 fn unsupported<T>(construct: impl Into<String>) -> Result<T> {
-    Err(CompileError::Unsupported { construct: construct.into() })
+    // The compiler knows where; see `compile`.
+    Err(CompileError::Unsupported { construct: construct.into(), offset: None })
 }
 
 /// Compiles the entry point of a validated module.
@@ -158,15 +176,16 @@ pub(crate) fn compile(module: &Module, info: &ModuleInfo, entry_point: &str) -> 
         .iter()
         .position(|entry| entry.name == entry_point && entry.stage == naga::ShaderStage::Compute)
         .ok_or_else(|| CompileError::EntryPoint { name: entry_point.to_owned() })?;
-    if !module.overrides.is_empty() {
-        return unsupported("override without a value (specialise the module first)");
+    if let Some((handle, _)) = module.overrides.iter().next() {
+        let error = unsupported("an override without a value (specialise the module first)");
+        return error.map_err(|error| error.at(module.overrides.get_span(handle)));
     }
     let mut facts = Facts::default();
     loop {
-        let mut compiler = Compiler::new(module, info, facts.clone())?;
+        let mut compiler = Compiler::new(module, info, facts.clone());
         let entry = &module.entry_points[index];
-        let function_info = info.get_entry_point(index);
-        compiler.entry_point(entry, function_info)?;
+        let compiled = compiler.globals().and_then(|()| compiler.entry_point(entry, info.get_entry_point(index)));
+        compiled.map_err(|error| error.at(compiler.span))?;
         // Every round finds at least one fact more, of finitely many.
         if compiler.facts == facts {
             return Ok(Code {
@@ -177,6 +196,7 @@ pub(crate) fn compile(module: &Module, info: &ModuleInfo, entry_point: &str) -> 
                 tables: compiler.tables,
                 workgroup_words: compiler.workgroup_words,
                 workgroup_size: entry.workgroup_size,
+                subgroup_size: crate::SUBGROUP_SIZE,
                 bindings: compiler.bindings,
             });
         }
@@ -185,8 +205,8 @@ pub(crate) fn compile(module: &Module, info: &ModuleInfo, entry_point: &str) -> 
 }
 
 impl<'a> Compiler<'a> {
-    fn new(module: &'a Module, info: &'a ModuleInfo, facts: Facts) -> Result<Self> {
-        let mut compiler = Self {
+    fn new(module: &'a Module, info: &'a ModuleInfo, facts: Facts) -> Self {
+        Self {
             module,
             info,
             ops: Vec::new(),
@@ -205,67 +225,15 @@ impl<'a> Compiler<'a> {
             depth: 0,
             loops: Vec::new(),
             loop_depth: 0,
-        };
-        for (handle, variable) in module.global_variables.iter() {
-            let value = compiler.global(variable)?;
-            compiler.globals.insert(handle, value);
-        }
-        Ok(compiler)
-    }
-
-    fn global(&mut self, variable: &GlobalVariable) -> Result<Value> {
-        let inner = self.module.types[variable.ty].inner.clone();
-        let name = variable.name.clone().unwrap_or_default();
-        let place = |root| Value::Place(Place { root, inner: inner.clone(), offset: 0, dynamic: Vec::new() });
-        let slot = self.bindings.len() as u32;
-        let mut bind = |kind| -> Result<()> {
-            let Some(at) = variable.binding else { return unsupported(format!("`{name}` without a binding")) };
-            self.bindings.push(BindingSlot { name: name.clone(), group: at.group, binding: at.binding, kind });
-            Ok(())
-        };
-        match variable.space {
-            AddressSpace::Uniform => {
-                bind(SlotKind::Buffer { writable: false })?;
-                Ok(place(Root::Memory(Memory::Buffer(slot))))
-            }
-            AddressSpace::Storage { access } => {
-                bind(SlotKind::Buffer { writable: access.contains(naga::StorageAccess::STORE) })?;
-                Ok(place(Root::Memory(Memory::Buffer(slot))))
-            }
-            AddressSpace::Handle => match inner {
-                TypeInner::Image { dim: naga::ImageDimension::D2, arrayed: false, .. } => {
-                    bind(SlotKind::Texture)?;
-                    Ok(Value::Texture(slot))
-                }
-                _ => unsupported(format!("`{name}`: a resource that is no two-dimensional texture")),
-            },
-            AddressSpace::WorkGroup => {
-                let mut layouter = naga::proc::Layouter::default();
-                layouter
-                    .update(self.module.to_ctx())
-                    .map_err(|error| CompileError::Unsupported { construct: format!("type of `{name}`: {error}") })?;
-                let offset = self.workgroup_words;
-                self.workgroup_words += layouter[variable.ty].size.div_ceil(4);
-                let place = Place { root: Root::Memory(Memory::Workgroup), inner, offset, dynamic: Vec::new() };
-                Ok(Value::Place(place))
-            }
-            AddressSpace::Private => {
-                let count = self.count(&inner)?;
-                let index = self.declare(count);
-                let initial = match variable.init {
-                    Some(init) => self.constant(init)?,
-                    None => vec![0; count as usize],
-                };
-                self.initialize(index, &initial.into_iter().map(Operand::Const).collect::<Vec<_>>());
-                Ok(place(Root::Variable(index)))
-            }
-            _ => unsupported(format!("`{name}`: address space {:?}", variable.space)),
         }
     }
 
     fn count(&self, inner: &TypeInner) -> Result<u32> {
-        let count = scalar_count(self.module, inner);
-        count.ok_or_else(|| CompileError::Unsupported { construct: format!("a value of type {inner:?}") })
+        let type_name = || match inner.scalar() {
+            Some(scalar) => number_name(scalar),
+            None => format!("values of type {inner:?}"),
+        };
+        scalar_count(self.module, inner).map_or_else(|| unsupported(type_name()), Ok)
     }
 
     fn emit(&mut self, op: Op) {
@@ -387,40 +355,8 @@ impl<'a> Compiler<'a> {
         self.release(&[a, b]);
         to
     }
-
-    /// The scalars of a constant expression, as bits.
-    fn constant(&self, handle: Handle<Expression>) -> Result<Vec<u32>> {
-        let expressions = &self.module.global_expressions;
-        match &expressions[handle] {
-            Expression::Literal(literal) => Ok(vec![literal_bits(*literal)?]),
-            Expression::Constant(constant) => self.constant(self.module.constants[*constant].init),
-            Expression::ZeroValue(ty) => Ok(vec![0; self.count(&self.module.types[*ty].inner)? as usize]),
-            Expression::Compose { components, .. } => {
-                let parts: Result<Vec<_>> = components.iter().map(|&part| self.constant(part)).collect();
-                Ok(parts?.concat())
-            }
-            Expression::Splat { size, value } => {
-                let value = self.constant(*value)?;
-                Ok((0..*size as u32).flat_map(|_| value.iter().copied()).collect())
-            }
-            other => unsupported(format!("constant expression {other:?}")),
-        }
-    }
-
-    /// Offsets of the scalars of a type in memory, in words.
-    fn offsets(&self, inner: &TypeInner) -> Vec<u32> {
-        let mut offsets = Vec::new();
-        word_offsets(self.module, inner, 0, &mut offsets);
-        offsets
-    }
 }
 
-fn literal_bits(literal: naga::Literal) -> Result<u32> {
-    match literal {
-        naga::Literal::F32(value) => Ok(value.to_bits()),
-        naga::Literal::U32(value) => Ok(value),
-        naga::Literal::I32(value) => Ok(value.cast_unsigned()),
-        naga::Literal::Bool(value) => Ok(if value { u32::MAX } else { 0 }),
-        other => unsupported(format!("literal {other:?}")),
-    }
+fn number_name(scalar: naga::Scalar) -> String {
+    format!("{}-bit numbers ({:?})", 8 * scalar.width, scalar.kind)
 }

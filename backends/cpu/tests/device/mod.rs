@@ -1,22 +1,24 @@
 //! A device that runs compute kernels.
 
+#![allow(dead_code, reason = "each test file uses a part of it")]
+
 use std::io::Write;
 use wgpu::util::DeviceExt;
 
 pub(crate) struct Gpu {
-    device: wgpu::Device,
-    queue: wgpu::Queue,
+    pub(crate) device: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
 }
 
 impl Gpu {
-    /// `None`, with the reason on stderr, where there is no device with default limits.
-    pub(crate) fn open() -> Option<Self> {
+    /// `None`, with the reason on stderr, where there is no device with default limits and these features.
+    pub(crate) fn open(required_features: wgpu::Features) -> Option<Self> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         let opened = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))
             .map_err(|error| error.to_string())
             .and_then(|adapter| {
-                let descriptor =
-                    wgpu::DeviceDescriptor { required_limits: wgpu::Limits::default(), ..Default::default() };
+                let required_limits = wgpu::Limits::default();
+                let descriptor = wgpu::DeviceDescriptor { required_features, required_limits, ..Default::default() };
                 pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| error.to_string())
             });
         match opened {
@@ -32,6 +34,18 @@ impl Gpu {
 
     /// Runs `main` with an output buffer of `count` words at binding 0 and a constant or read-only buffer at 1.
     pub(crate) fn run(&self, source: &str, groups: u32, count: usize, input: &[u32]) -> Vec<u32> {
+        self.run_with(source, groups, count, input, &[])
+    }
+
+    /// The same with more bindings.
+    pub(crate) fn run_with(
+        &self,
+        source: &str,
+        groups: u32,
+        count: usize,
+        input: &[u32],
+        more: &[wgpu::BindGroupEntry<'_>],
+    ) -> Vec<u32> {
         let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: None,
             source: wgpu::ShaderSource::Wgsl(source.into()),
@@ -62,6 +76,7 @@ impl Gpu {
         if source.contains("numbers.") || source.contains("numbers[") {
             entries.push(wgpu::BindGroupEntry { binding: 1, resource: input.as_entire_binding() });
         }
+        entries.extend_from_slice(more);
         let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
             layout: &layout,

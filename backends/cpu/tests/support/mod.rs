@@ -8,7 +8,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use limpid_cpu::{Binding, Buffer, CompileError, Executor};
-use naga::valid::{Capabilities, ValidationFlags, Validator};
+use naga::valid::{Capabilities, ShaderStages, SubgroupOperationSet, ValidationFlags, Validator};
 
 /// What buffers hold before a kernel runs.
 pub(crate) const UNTOUCHED: u32 = 0xdead_beef;
@@ -20,6 +20,7 @@ pub(crate) fn compile(source: &str, entry_point: &str) -> Result<Executor, Compi
     let module =
         naga::front::wgsl::parse_str(source).unwrap_or_else(|error| panic!("{}", error.emit_to_string(source)));
     let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
+    validator.subgroup_stages(ShaderStages::COMPUTE).subgroup_operations(SubgroupOperationSet::all());
     let info = validator.validate(&module).unwrap_or_else(|error| panic!("{}", error.emit_to_string(source)));
     Executor::new(&module, &info, entry_point)
 }
@@ -91,9 +92,9 @@ pub(crate) fn check(code: &str, expected: impl Fn(u32, u32) -> u32) {
             for (kind, selector) in [("varying", "(i * 7u + 3u) % 8u"), ("uniform", "numbers.y"), ("constant", "5u")] {
                 let call = surrounding.code;
                 let source = format!(
-                    "@group(0) @binding(0) var<storage, read_write> out: array<u32>;
+                    "{code}
+                    @group(0) @binding(0) var<storage, read_write> out: array<u32>;
                     @group(0) @binding(1) var<uniform> numbers: vec4<u32>;
-                    {code}
                     @compute @workgroup_size({size})
                     fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
                         let i = id.x;
