@@ -15,10 +15,11 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
 /// Largest share of a resource's values that may be more than two half-float steps apart between different
-/// devices in one frame, and how many may be so however small the image is. Exponentials, logarithms and roots
-/// differ by units in the last place between devices.
-const MAX_FAR_SHARE: f64 = 0.01;
-const MAX_FAR_VALUES: usize = 16;
+/// devices in one frame, and how many may be so however small the image is. Divisions, exponentials, logarithms
+/// and roots differ by units in the last place between devices, and the power of 512 of a cosine makes that a
+/// thousand times more; `precision.rs` shows that nothing else does it.
+const MAX_FAR_SHARE: f64 = 0.03;
+const MAX_FAR_VALUES: usize = 64;
 /// The same for all cases together.
 const MAX_FAR_SHARE_OVERALL: f64 = 0.001;
 /// Those differences now and then decide at a threshold whether a pixel has history: share of pixels for which
@@ -40,7 +41,7 @@ fn check_pair(a: &[Snapshot], b: &[Snapshot], total: &mut (Table, usize)) -> Res
         let mut table = Table::default();
         table.add(a, b);
         let pixels = a.0["signal"].len() / 2;
-        let decisions = Table::decisions(a, b);
+        let decisions = Table::decisions(a, b).len();
         total.1 += decisions;
         if decisions > MAX_DECISIONS.max((MAX_DECISION_SHARE * pixels as f64) as usize) {
             return fail("decisions", decisions, pixels, frame);

@@ -224,6 +224,13 @@ impl Denoiser {
         Ok(())
     }
 
+    /// Makes functions as inexact as Vulkan lets devices be; see [`Executor::with_inexact_functions`]. Lasts until a
+    /// change of settings that makes everything anew.
+    pub fn make_inexact(&mut self, seed: u32) {
+        let executors = std::mem::take(&mut self.executors);
+        self.executors = executors.into_iter().map(|executor| executor.with_inexact_functions(seed)).collect();
+    }
+
     /// From now on runs kernels one workgroup after another and watches them; see
     /// [`Executor::dispatch_checked`].
     pub fn watch(&mut self) {

@@ -2,6 +2,7 @@ use naga::valid::ModuleInfo;
 use rayon::prelude::*;
 
 use crate::compile::{BindingSlot, Code, SlotKind, compile};
+use crate::inexact::Inexact;
 use crate::machine::{Bound, Machine};
 use crate::{Buffer, CompileError, DispatchError, Fault, Sampler, Texture};
 
@@ -59,6 +60,14 @@ impl Executor {
         }
         self.code.subgroup_size = size;
         Ok(self)
+    }
+
+    /// The same with functions that are as inexact as Vulkan lets devices be: divisions, roots, exponentials,
+    /// logarithms, powers and trigonometric functions get errors within the bounds of the specification, which
+    /// depend on `seed` and on their result. Shows what hangs on last digits, and so what devices may disagree on.
+    pub fn with_inexact_functions(mut self, seed: u32) -> Self {
+        self.code.inexact = Some(Inexact { seed });
+        self
     }
 
     /// Number of instructions.

@@ -49,6 +49,7 @@ mod denoiser;
 mod error;
 mod eval;
 mod executor;
+mod inexact;
 mod layout;
 mod machine;
 mod math;

@@ -10,6 +10,7 @@ use crate::LANES;
 use crate::check::{Checker, Fault, Shared, Use};
 use crate::compile::Code;
 use crate::eval::{f, with_binary, with_unary};
+use crate::inexact::Inexact;
 use crate::op::{Atomic, BuiltIn, Op, Operand};
 use crate::resource::{Buffer, Texture};
 use crate::sampler::Sampler;
@@ -285,8 +286,15 @@ fn run<'a>(machine: &mut Machine<'a>) {
                     };
                 }
                 with_unary!(op, apply);
+                if let Some(inexact) = code.inexact {
+                    machine.unary(to, to, |bits| inexact.unary(op, bits));
+                }
             }
             Op::Binary { op, to, a, b } => {
+                if let Some(inexact) = code.inexact.filter(|_| Inexact::concerns(op)) {
+                    machine.binary(to, a, b, |a, b| inexact.binary(op, a, b));
+                    continue;
+                }
                 macro_rules! apply {
                     ($function:expr) => {
                         machine.binary(to, a, b, $function)

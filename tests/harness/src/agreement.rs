@@ -45,7 +45,7 @@ fn ordered(bits: u32) -> i32 {
 }
 
 /// Steps from one half float to another.
-fn half_steps(a: u32, b: u32) -> u32 {
+pub fn half_steps(a: u32, b: u32) -> u32 {
     ordered(a & 0xffff).abs_diff(ordered(b & 0xffff))
 }
 
@@ -87,13 +87,14 @@ impl Table {
 
     /// Pixels whose reprojected history differs by more than two steps of a half float, or in length: where
     /// two executors decided differently about what last frame shows there.
-    pub fn decisions(a: &Snapshot, b: &Snapshot) -> usize {
+    pub fn decisions(a: &Snapshot, b: &Snapshot) -> Vec<usize> {
         let differs = |(a, b): (&[u32], &[u32])| {
             let radiance = [(a[0], b[0]), (a[0] >> 16, b[0] >> 16), (a[1], b[1])];
             let length = |word: u32| (word >> 16) & 255;
             radiance.iter().any(|&(a, b)| half_steps(a, b) > 2) || length(a[1]).abs_diff(length(b[1])) > 1
         };
-        a.0["signal"].chunks_exact(2).zip(b.0["signal"].chunks_exact(2)).filter(|&pair| differs(pair)).count()
+        let pairs = a.0["signal"].chunks_exact(2).zip(b.0["signal"].chunks_exact(2));
+        pairs.enumerate().filter(|&(_, pair)| differs(pair)).map(|(index, _)| index).collect()
     }
 
     /// Adds another table.

@@ -9,7 +9,7 @@ pub mod executor;
 mod snapshot;
 pub mod strategy;
 
-pub use agreement::{Agreement, Table};
+pub use agreement::{Agreement, Table, half_steps};
 pub use case::{Case, Change, Image, Images, Pixel, Step, TexelFormat, half_bits};
 pub use executor::{Executor, executors, fastest};
 pub use snapshot::Snapshot;

@@ -23,6 +23,7 @@ use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{Expression, Function, GlobalVariable, Handle, LocalVariable, Module, TypeInner};
 
 use crate::error::CompileError;
+use crate::inexact::Inexact;
 use crate::layout::scalar_count;
 use crate::op::{Binary, Memory, Op, Operand, Unary};
 use crate::registers::Registers;
@@ -62,6 +63,8 @@ pub(crate) struct Code {
     pub(crate) workgroup_size: [u32; 3],
     /// A divisor of `LANES`.
     pub(crate) subgroup_size: u32,
+    /// Errors to add to functions.
+    pub(crate) inexact: Option<Inexact>,
     pub(crate) bindings: Vec<BindingSlot>,
 }
 
@@ -197,6 +200,7 @@ pub(crate) fn compile(module: &Module, info: &ModuleInfo, entry_point: &str) -> 
                 workgroup_words: compiler.workgroup_words,
                 workgroup_size: entry.workgroup_size,
                 subgroup_size: crate::SUBGROUP_SIZE,
+                inexact: None,
                 bindings: compiler.bindings,
             });
         }

@@ -10,6 +10,7 @@ use crate::{Image, Snapshot, TexelFormat};
 pub struct Cpu {
     denoiser: Option<Denoiser>,
     is_watched: bool,
+    inexact: Option<u32>,
 }
 
 impl Cpu {
@@ -20,7 +21,12 @@ impl Cpu {
 
     /// In checked mode; see [`faults`](Self::faults).
     pub fn watched() -> Self {
-        Self { denoiser: None, is_watched: true }
+        Self { is_watched: true, ..Self::default() }
+    }
+
+    /// With functions as inexact as Vulkan lets devices be.
+    pub fn inexact(seed: u32) -> Self {
+        Self { inexact: Some(seed), ..Self::default() }
     }
 
     /// What kernels did that they must not, as text.
@@ -55,6 +61,9 @@ impl Executor for Cpu {
         let mut denoiser = Denoiser::with_core(core).unwrap();
         if self.is_watched {
             denoiser.watch();
+        }
+        if let Some(seed) = self.inexact {
+            denoiser.make_inexact(seed);
         }
         self.denoiser = Some(denoiser);
     }
