@@ -49,6 +49,11 @@ pub fn half_steps(a: u32, b: u32) -> u32 {
     ordered(a & 0xffff).abs_diff(ordered(b & 0xffff))
 }
 
+/// Whether a pixel is denoised: the guide's depth is negative where it is left out.
+fn is_denoised(snapshot: &Snapshot, pixel: usize) -> bool {
+    f32::from_bits(snapshot.0["guide"][2 * pixel]) > 0.0
+}
+
 /// Agreement by resource.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table(pub BTreeMap<String, Agreement>);
@@ -65,7 +70,12 @@ impl Table {
             let others = &b.0[name];
             assert_eq!(words.len(), others.len(), "{name}");
             let is_halves = matches!(name.as_str(), "signal" | "previous signal" | "average" | "output");
-            for (index, (&a, &b)) in words.iter().zip(others).enumerate() {
+            for (index, (&word, &other)) in words.iter().zip(others).enumerate() {
+                // Where nothing is denoised a signal holds what was there before.
+                if name == "signal" && !(is_denoised(a, index / 2) && is_denoised(b, index / 2)) {
+                    continue;
+                }
+                let (a, b) = (word, other);
                 let agreement = self.0.entry(name.clone()).or_default();
                 if !is_halves {
                     agreement.add(u32::from(a != b));
@@ -94,7 +104,8 @@ impl Table {
             radiance.iter().any(|&(a, b)| half_steps(a, b) > 2) || length(a[1]).abs_diff(length(b[1])) > 1
         };
         let pairs = a.0["signal"].chunks_exact(2).zip(b.0["signal"].chunks_exact(2));
-        pairs.enumerate().filter(|&(_, pair)| differs(pair)).map(|(index, _)| index).collect()
+        let decided = pairs.enumerate().filter(|&(_, pair)| differs(pair)).map(|(index, _)| index);
+        decided.filter(|&pixel| is_denoised(a, pixel) && is_denoised(b, pixel)).collect()
     }
 
     /// Adds another table.
