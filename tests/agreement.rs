@@ -23,9 +23,10 @@ const MAX_FAR_VALUES: usize = 64;
 /// The same for all cases together.
 const MAX_FAR_SHARE_OVERALL: f64 = 0.001;
 /// Those differences now and then decide at a threshold whether a pixel has history: share of pixels for which
-/// that may be so in one frame, and how many may be so however small the image is.
-const MAX_DECISION_SHARE: f64 = 0.01;
-const MAX_DECISIONS: usize = 4;
+/// that may be so in one frame, and how many may be so however small the image is. Where everything is constant many
+/// pixels can be at the same threshold.
+const MAX_DECISION_SHARE: f64 = 0.02;
+const MAX_DECISIONS: usize = 24;
 /// Values of the output that a pixel's decision reaches through the 8x8 average: 3x3 tiles.
 const DECISION_FOOTPRINT: usize = 24 * 24 * 4;
 

@@ -3,6 +3,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod analyze;
 pub mod backend;
 pub mod commands;
 pub mod metrics;

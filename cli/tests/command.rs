@@ -67,7 +67,7 @@ fn demo<'a>(out: &'a str, more: &[&'a str]) -> serde_json::Value {
 fn usage_is_explained_and_mistakes_have_code_two() {
     let help = limpid(&["--help"]);
     assert!(help.status.success());
-    for command in ["demo", "denoise", "plan"] {
+    for command in ["demo", "denoise", "analyze", "plan"] {
         assert!(text(&help.stdout).contains(command));
         assert!(limpid(&[command, "--help"]).status.success());
     }
@@ -194,4 +194,21 @@ fn bad_sequences_are_refused_and_finished_frames_stay() {
     fs::write(&camera, &good).unwrap();
     assert_eq!(Sequence::open(&noisy, &ChannelNames::default()).unwrap().len(), 4);
     succeeds(&["denoise", sequence, "--out", path(&out), "--force"]);
+}
+
+#[test]
+fn data_that_means_something_else_is_recognised() {
+    let folder = Folder::new("analyze");
+    let out = folder.join("dolly");
+    demo(path(&out), &["--scene", "dolly", "--size", "128x72"]);
+    let noisy = out.join("noisy");
+    let right = succeeds(&["analyze", path(&noisy), "--json"]);
+    let right: serde_json::Value = serde_json::from_str(&right).unwrap();
+    assert_eq!(right["settings"], "");
+    // With the wrong sign in the settings the right one is advised.
+    let wrong = ["analyze", path(&noisy), "--set", "conventions.motion_scale=[-1.0, -1.0]"];
+    fails(&wrong, 1, &["does not mean what limpid takes it for"]);
+    let text = text(&limpid(&wrong).stdout);
+    assert!(text.contains("they point the other way") && text.contains("[1, 1]"), "{text}");
+    fails(&["analyze", path(&folder.join("nowhere"))], 1, &["camera.json"]);
 }

@@ -1,5 +1,6 @@
 //! The subcommands.
 
+mod analyze;
 mod demo;
 mod denoise;
 mod plan;
@@ -26,6 +27,8 @@ enum Command {
     Demo(demo::Demo),
     /// Denoises a sequence of EXR frames.
     Denoise(denoise::Denoise),
+    /// Looks at a sequence's data and says what is wrong with it.
+    Analyze(analyze::Analyze),
     /// Prints what is allocated and dispatched for some settings and size.
     Plan(plan::PlanCommand),
 }
@@ -40,6 +43,7 @@ impl Cli {
         match self.command {
             Command::Demo(demo) => demo.run(),
             Command::Denoise(denoise) => denoise.run(),
+            Command::Analyze(analyze) => analyze.run(),
             Command::Plan(plan) => plan.run(),
         }
     }
