@@ -122,7 +122,7 @@ impl Gatherer {
             self.radiance_sum += f64::from(brightest);
             self.largest_radiance = self.largest_radiance.max(brightest);
             // Every seventh is enough for shares.
-            if i % 7 == 0 {
+            if i.is_multiple_of(7) {
                 self.radiance.push(brightest);
                 self.depths.push(frame.depth[i]);
             }
