@@ -66,6 +66,11 @@ fn radiance_weight(radiance: vec3<f32>, average: vec3<f32>, variance: f32) -> f3
     return max(exp(-falloff * length(average - radiance)), frame.prefilter_radiance_weight_floor);
 }
 
+fn depth_weight(center_depth: f32, depth: f32) -> f32 {
+    // Bounded, so that no falloff makes it infinite: infinity times 0 is no number.
+    return exp(-frame.prefilter_depth_falloff * min(center_depth * abs(center_depth - depth), 1e26));
+}
+
 // Zero to the power of zero is left to the driver by the languages that kernels are emitted in.
 fn normal_weight(cosine: f32) -> f32 {
     return pow(clamp(cosine, 1e-6, 1.0), frame.prefilter_normal_power);
@@ -89,7 +94,7 @@ fn prefilter_at(center: u32, average: vec3<f32>) -> vec4<f32> {
         if depth > 0.0 {
             let signal = unpack_radiance(window_radiance[entry]);
             let weight = normal_weight(dot(center_normal, window_normal_at(entry)))
-                * exp(-frame.prefilter_depth_falloff * center_depth * abs(center_depth - depth))
+                * depth_weight(center_depth, depth)
                 * radiance_weight(signal.rgb, average, variance)
                 * variance_weight;
             weight_sum += weight;

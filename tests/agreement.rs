@@ -160,7 +160,18 @@ fn what_was_found_before() {
     near.settings.conventions.depth = limpid::settings::DepthEncoding::Linear;
     near.settings.coverage.roughness_threshold = 0.4;
     near.settings.coverage.fallback = Fallback::Environment;
-    check_spec(&near, &mut executors(), &mut Tables::new()).unwrap();
+    // The largest falloff by depth times the largest depth was infinite, and infinity times no difference no number.
+    let mut far = Spec {
+        size: UVec2::new(1, 2),
+        settings: near.settings.clone(),
+        later_settings: None,
+        frames: vec![FrameSpec { depth: Field::Constant(5e29), ..CALM }],
+    };
+    far.settings.coverage.roughness_threshold = 1.0;
+    far.settings.prefilter.depth_falloff = 1e12;
+    for spec in [near, far] {
+        check_spec(&spec, &mut executors(), &mut Tables::new()).unwrap();
+    }
 }
 
 /// Moving, noisy surfaces of all kinds, as the teeth of the comparison bite into.
