@@ -23,6 +23,10 @@ override NORMAL_ENCODING: u32 = 0u;
 override ROUGHNESS_CHANNEL: u32 = 0u;
 // The roughness texture holds GGX alpha, not perceptual roughness.
 override ROUGHNESS_IS_ALPHA: bool = false;
+// All surfaces have the roughness in the constants; there is no texture of it.
+override ROUGHNESS_IS_CONSTANT: bool = false;
+// Some later pass uses the 8x8 averages.
+override AVERAGE_IS_USED: bool = true;
 // Rays in a 2x2 quad: 1, 2 or 4; 0: no ray list.
 override RAYS_PER_QUAD: u32 = 0u;
 // Pixels whose variance was high last frame get their own ray.
@@ -72,7 +76,10 @@ fn decode_depth(pixel: vec2<u32>) -> f32 {
 // Texels that hold no direction or no roughness make their pixel one without a surface.
 fn decode_guide(pixel: vec2<u32>) -> Guide {
     let normal = decode_normal(textureLoad(in_normal, pixel, 0));
-    let stored_roughness = textureLoad(in_roughness, pixel, 0)[ROUGHNESS_CHANNEL];
+    var stored_roughness = frame.constant_roughness;
+    if !ROUGHNESS_IS_CONSTANT {
+        stored_roughness = textureLoad(in_roughness, pixel, 0)[ROUGHNESS_CHANNEL];
+    }
     let squared_length = dot(normal, normal);
     let usable = is_finite(squared_length) && squared_length > 1e-12 && is_finite(stored_roughness);
     var guide: Guide;
@@ -167,7 +174,9 @@ fn classify(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_i
         } else {
             let counts = tile_counts();
             out_tiles[counts.x * counts.y - 1u - atomicAdd(&out_counters[1], 1u)] = pack_tile(tile);
-            textureStore(out_average, tile, vec4<f32>(0.0));
+            if AVERAGE_IS_USED {
+                textureStore(out_average, tile, vec4<f32>(0.0));
+            }
         }
     }
 

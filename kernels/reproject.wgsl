@@ -22,6 +22,17 @@ import package::shared::radiance;
 import package::shared::tiles;
 import package::shared::neighborhood;
 
+// Looks for history where the reflected point was, seen in the surface.
+override MIRROR_PARALLAX: bool = true;
+// Looks for history where the surface was.
+override SURFACE_MOTION: bool = true;
+// Looks around a place that does not fit well.
+override HISTORY_SEARCH: bool = true;
+// Takes those of four texels that fit where not all do.
+override EDGE_REPAIR: bool = true;
+// Some later pass uses the 8x8 averages.
+override AVERAGE_IS_USED: bool = true;
+
 @group(0) @binding(5) var in_motion: texture_2d<f32>;
 
 @group(1) @binding(0) var in_guide: texture_2d<u32>;
@@ -160,33 +171,39 @@ fn match_at(prev_uv: vec2<f32>, guide: Guide, surface: PrevSurface) -> Match {
 // One of the two candidates, or none, by last frame's normal, roughness and colour.
 fn choose_candidate(pixel: vec2<u32>, lane: u32, guide: Guide, hit_distance: f32) -> Match {
     let alpha = alpha_of(guide.roughness);
-    let surface_uv = surface_prev_uv(pixel);
+    var surface_uv = vec2<f32>(-1.0);
     var surface: PrevSurface;
     // Off screen it fits as badly as can be.
     var surface_cosine = -1.0;
     var surface_alpha_error = 1.0;
-    let has_surface = is_on_prev_screen(surface_uv);
-    if has_surface {
-        surface = prev_surface_at(surface_uv);
-        surface_cosine = dot(guide.normal, surface.normal);
-        surface_alpha_error = abs(surface.alpha - alpha);
-    }
-    let parallax_uv = parallax_prev_uv(pixel, guide, hit_distance);
-    if is_on_prev_screen(parallax_uv) {
-        let parallax = prev_surface_at(parallax_uv);
-        let parallax_cosine = dot(guide.normal, parallax.normal);
-        if parallax_cosine > frame.parallax_normal_cosine
-            && parallax_cosine + frame.parallax_normal_margin > surface_cosine
-            && abs(parallax.alpha - alpha) < surface_alpha_error + frame.parallax_roughness_margin {
-            return match_at(parallax_uv, guide, parallax);
+    if SURFACE_MOTION {
+        surface_uv = surface_prev_uv(pixel);
+        if is_on_prev_screen(surface_uv) {
+            surface = prev_surface_at(surface_uv);
+            surface_cosine = dot(guide.normal, surface.normal);
+            surface_alpha_error = abs(surface.alpha - alpha);
         }
     }
-    if has_surface {
-        let found = match_at(surface_uv, guide, surface);
-        let statistics = neighborhood_statistics(lane);
-        let difference = found.history.rgb - statistics.mean;
-        if dot(difference, difference) < frame.surface_color_gate * length(statistics.variance) {
-            return found;
+    if MIRROR_PARALLAX {
+        let parallax_uv = parallax_prev_uv(pixel, guide, hit_distance);
+        if is_on_prev_screen(parallax_uv) {
+            let parallax = prev_surface_at(parallax_uv);
+            let parallax_cosine = dot(guide.normal, parallax.normal);
+            if parallax_cosine > frame.parallax_normal_cosine
+                && parallax_cosine + frame.parallax_normal_margin > surface_cosine
+                && abs(parallax.alpha - alpha) < surface_alpha_error + frame.parallax_roughness_margin {
+                return match_at(parallax_uv, guide, parallax);
+            }
+        }
+    }
+    if SURFACE_MOTION {
+        if is_on_prev_screen(surface_uv) {
+            let found = match_at(surface_uv, guide, surface);
+            let statistics = neighborhood_statistics(lane);
+            let difference = found.history.rgb - statistics.mean;
+            if dot(difference, difference) < frame.surface_color_gate * length(statistics.variance) {
+                return found;
+            }
         }
     }
     return no_match();
@@ -239,9 +256,13 @@ fn repair_edge(guide: Guide, found: Match) -> Match {
 fn find_history(pixel: vec2<u32>, lane: u32, guide: Guide, hit_distance: f32) -> Match {
     var found = choose_candidate(pixel, lane, guide, hit_distance);
     if found.factor >= 0.0 && found.factor < frame.disocclusion_threshold {
-        found = search_around(guide, found);
-        if found.factor < frame.disocclusion_threshold {
-            found = repair_edge(guide, found);
+        if HISTORY_SEARCH {
+            found = search_around(guide, found);
+        }
+        if EDGE_REPAIR {
+            if found.factor < frame.disocclusion_threshold {
+                found = repair_edge(guide, found);
+            }
         }
     }
     let has_reflection = dot(found.reflections.weights, vec4<f32>(1.0)) > 0.001;
@@ -264,20 +285,23 @@ fn reproject(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     }
     let tile = unpack_tile(in_tiles[index]);
     let pixel = tile * TILE_SIZE + lane_position(lane);
-    for (var i = 0u; i < 4u; i++) {
-        let entry = lane + 64u * i;
-        let p = window_pixel(tile, entry);
-        var radiance = vec3<f32>(0.0);
-        var counts = false;
-        if all(p >= vec2<i32>(0)) && all(p < vec2<i32>(frame.size)) {
-            counts = packed_guide_is_denoised(textureLoad(in_guide, p, 0).xy);
-            radiance = load_radiance(vec2<u32>(p));
+    // Only the colour of surface motion is compared with the neighbourhood's.
+    if SURFACE_MOTION {
+        for (var i = 0u; i < 4u; i++) {
+            let entry = lane + 64u * i;
+            let p = window_pixel(tile, entry);
+            var radiance = vec3<f32>(0.0);
+            var counts = false;
+            if all(p >= vec2<i32>(0)) && all(p < vec2<i32>(frame.size)) {
+                counts = packed_guide_is_denoised(textureLoad(in_guide, p, 0).xy);
+                radiance = load_radiance(vec2<u32>(p));
+            }
+            store_window(entry, radiance, counts);
         }
-        store_window(entry, radiance, counts);
+        workgroupBarrier();
+        sum_rows(lane);
+        workgroupBarrier();
     }
-    workgroupBarrier();
-    sum_rows(lane);
-    workgroupBarrier();
 
     // rgb: weighted radiance, a: weight in the average of the tile.
     var contribution = vec4<f32>(0.0);
@@ -298,25 +322,29 @@ fn reproject(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
                 reprojected.variance = mix(spread, found.history.a, 1.0 / reprojected.length);
                 radiance = mix(radiance, found.history.rgb, frame.average_history_blend);
             }
-            let weight = max(exp(-frame.average_luminance_falloff * luminance(radiance)), frame.average_weight_floor);
-            contribution = vec4<f32>(radiance * weight, weight);
+            if AVERAGE_IS_USED {
+                let weight = max(exp(-frame.average_luminance_falloff * luminance(radiance)), frame.average_weight_floor);
+                contribution = vec4<f32>(radiance * weight, weight);
+            }
         }
         textureStore(out_reprojected, pixel, vec4<u32>(pack_reprojected(reprojected), 0u, 0u));
     }
 
-    // The row sums have been read by all: their memory serves the average.
-    workgroupBarrier();
-    row_sum[lane] = contribution;
-    workgroupBarrier();
-    for (var stride = 32u; stride > 0u; stride >>= 1u) {
-        if lane < stride {
-            row_sum[lane] += row_sum[lane + stride];
-        }
+    if AVERAGE_IS_USED {
+        // The row sums have been read by all: their memory serves the average.
         workgroupBarrier();
-    }
-    if lane == 0u {
-        let total = row_sum[0];
-        let average = min(total.rgb / max(total.a, 1e-12), vec3<f32>(HALF_MAX));
-        textureStore(out_average, tile, rounded_to_half(vec4<f32>(average, 1.0)));
+        row_sum[lane] = contribution;
+        workgroupBarrier();
+        for (var stride = 32u; stride > 0u; stride >>= 1u) {
+            if lane < stride {
+                row_sum[lane] += row_sum[lane + stride];
+            }
+            workgroupBarrier();
+        }
+        if lane == 0u {
+            let total = row_sum[0];
+            let average = min(total.rgb / max(total.a, 1e-12), vec3<f32>(HALF_MAX));
+            textureStore(out_average, tile, rounded_to_half(vec4<f32>(average, 1.0)));
+        }
     }
 }

@@ -1,11 +1,11 @@
 //! Resolve temporal: clips history to what this frame makes plausible and blends both by the history's length.
 //!
-//! in   prefiltered    rg32uint      full   packed radiance and variance
+//! in   prefiltered    rg32uint      full   packed radiance and variance (with the spatial filter)
 //! in   reprojected    rg32uint      full   packed history radiance and length
 //! in   guide          rg32uint      full   left-out flag (and surface, for the environment fallback)
-//! in   average        rgba16float   tile
+//! in   average        rgba16float   tile   (history clip or average mixing)
 //! in   tiles, args    lists         tiles to denoise
-//! in   radiance       any float     full   input fallback only
+//! in   radiance       any float     full   input fallback, or no spatial filter
 //! out  output         rgba16float   full   rgb: denoised radiance; a: variance, 0..1. Next frame's history.
 //!
 //! Grid: one 8x8 workgroup per listed tile (indirect). 18 taps of workgroup memory for the 9x9 statistics.
@@ -19,6 +19,15 @@ import package::shared::tiles;
 import package::shared::neighborhood;
 import package::shared::average;
 import package::shared::fallback;
+
+// The prefilter has run.
+override SPATIAL_FILTER: bool = true;
+// History and this frame's colour are clipped to what the neighbourhood makes plausible.
+override HISTORY_CLIP: bool = true;
+// The 8x8 average is mixed into the colour where history is short.
+override AVERAGE_MIXING: bool = true;
+// One of these two.
+override AVERAGE_IS_READ: bool = true;
 
 @group(1) @binding(1) var in_guide: texture_2d<u32>;
 @group(1) @binding(2) var in_reprojected: texture_2d<u32>;
@@ -35,23 +44,38 @@ fn clip_to_box(color: vec3<f32>, center: vec3<f32>, extent: vec3<f32>) -> vec3<f
     return select(color, center + offset / max(farthest, 1.0), farthest > 1.0);
 }
 
+// rgb: this frame's radiance, exposed; a: its variance.
+fn current_signal(pixel: vec2<u32>, reprojected: Reprojected) -> vec4<f32> {
+    if SPATIAL_FILTER {
+        return unpack_radiance(textureLoad(in_prefiltered, pixel, 0).xy);
+    }
+    return vec4<f32>(load_radiance(pixel), reprojected.variance);
+}
+
 // rgb: denoised radiance, exposed; a: variance.
-fn resolve(pixel: vec2<u32>, statistics: Statistics) -> vec4<f32> {
-    let filtered = unpack_radiance(textureLoad(in_prefiltered, pixel, 0).xy);
+fn resolve(pixel: vec2<u32>, lane: u32) -> vec4<f32> {
     let reprojected = unpack_reprojected(textureLoad(in_reprojected, pixel, 0).xy);
-    let average = sample_average(pixel);
-
-    let spread = sqrt(statistics.variance) + length(statistics.mean - average);
-    let extent = spread * frame.stability * frame.clip_scale;
-    let center = mix(statistics.mean, average, frame.clip_average_pull);
-    let history = clip_to_box(reprojected.radiance, center, extent);
-
+    let signal = current_signal(pixel, reprojected);
+    var average = vec3<f32>(0.0);
+    if AVERAGE_IS_READ {
+        average = sample_average(pixel);
+    }
+    var history = reprojected.radiance;
+    var current = signal.rgb;
+    if AVERAGE_MIXING {
+        current = mix(current, average, 1.0 / max(reprojected.length + 1.0, 1.0));
+    }
+    if HISTORY_CLIP {
+        let statistics = neighborhood_statistics(lane);
+        let spread = sqrt(statistics.variance) + length(statistics.mean - average);
+        let extent = spread * frame.stability * frame.clip_scale;
+        let center = mix(statistics.mean, average, frame.clip_average_pull);
+        history = clip_to_box(history, center, extent);
+        current = clip_to_box(current, average, extent);
+    }
     let weight = 1.0 - 1.0 / max(reprojected.length, 1.0);
-    let settled = mix(filtered.rgb, average, 1.0 / max(reprojected.length + 1.0, 1.0));
-    let current = clip_to_box(settled, average, extent);
-
     let radiance = mix(current, history, weight);
-    let variance = mix(temporal_variance(radiance, history), filtered.a, weight);
+    let variance = mix(temporal_variance(radiance, history), signal.a, weight);
     return vec4<f32>(radiance, variance);
 }
 
@@ -63,20 +87,26 @@ fn resolve_temporal(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invo
     }
     let tile = unpack_tile(in_tiles[index]);
     let pixel = tile * TILE_SIZE + lane_position(lane);
-    for (var i = 0u; i < 4u; i++) {
-        let entry = lane + 64u * i;
-        let p = window_pixel(tile, entry);
-        var radiance = vec3<f32>(0.0);
-        var counts = false;
-        if all(p >= vec2<i32>(0)) && all(p < vec2<i32>(frame.size)) {
-            counts = packed_guide_is_denoised(textureLoad(in_guide, p, 0).xy);
-            radiance = unpack_radiance(textureLoad(in_prefiltered, p, 0).xy).rgb;
+    if HISTORY_CLIP {
+        for (var i = 0u; i < 4u; i++) {
+            let entry = lane + 64u * i;
+            let p = window_pixel(tile, entry);
+            var radiance = vec3<f32>(0.0);
+            var counts = false;
+            if all(p >= vec2<i32>(0)) && all(p < vec2<i32>(frame.size)) {
+                counts = packed_guide_is_denoised(textureLoad(in_guide, p, 0).xy);
+                if SPATIAL_FILTER {
+                    radiance = unpack_radiance(textureLoad(in_prefiltered, p, 0).xy).rgb;
+                } else {
+                    radiance = load_radiance(vec2<u32>(p));
+                }
+            }
+            store_window(entry, radiance, counts);
         }
-        store_window(entry, radiance, counts);
+        workgroupBarrier();
+        sum_rows(lane);
+        workgroupBarrier();
     }
-    workgroupBarrier();
-    sum_rows(lane);
-    workgroupBarrier();
 
     if any(pixel >= frame.size) {
         return;
@@ -84,7 +114,7 @@ fn resolve_temporal(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invo
     let guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
     var result: vec4<f32>;
     if guide.denoised {
-        result = resolve(pixel, neighborhood_statistics(lane));
+        result = resolve(pixel, lane);
         result = vec4<f32>(min(result.rgb * frame.inverse_exposure, vec3<f32>(HALF_MAX)), result.a);
     } else {
         result = vec4<f32>(fallback_radiance(pixel, guide), 0.0);

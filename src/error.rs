@@ -16,6 +16,12 @@ pub enum Error {
         /// The range it must lie in.
         expected: &'static str,
     },
+    /// Features that make no sense together.
+    #[error("these features cannot be combined: {reason}")]
+    Features {
+        /// Why not.
+        reason: &'static str,
+    },
     /// A size is zero or larger than limpid supports.
     #[error("{what} is {size} pixels, expected 1 to {limit} in each direction")]
     Size {

@@ -114,7 +114,7 @@ constants! {
         clip_average_pull: f32,
         clip_extent_floor: f32,
         history_length_steps: f32,
-        padding: f32,
+        constant_roughness: f32,
     }
 }
 
@@ -306,6 +306,6 @@ pub(crate) fn constants(
         clip_average_pull: resolve.clip_average_pull,
         clip_extent_floor: resolve.clip_extent_floor,
         history_length_steps: (255.0 / reproject.max_history).floor(),
-        padding: 0.0,
+        constant_roughness: settings.features.constant_roughness.unwrap_or(0.0),
     })
 }

@@ -117,6 +117,8 @@ const PASSES: &[PassTemplate] = &[
             "NORMAL_ENCODING",
             "ROUGHNESS_CHANNEL",
             "ROUGHNESS_IS_ALPHA",
+            "ROUGHNESS_IS_CONSTANT",
+            "AVERAGE_IS_USED",
             "RAYS_PER_QUAD",
             "RAYS_FOLLOW_VARIANCE",
         ],
@@ -143,7 +145,7 @@ const PASSES: &[PassTemplate] = &[
         kernel: "reproject",
         stage: Stage::Denoise,
         grid: GridTemplate::List(0),
-        overrides: &[],
+        overrides: &["MIRROR_PARALLAX", "SURFACE_MOTION", "HISTORY_SEARCH", "EDGE_REPAIR", "AVERAGE_IS_USED"],
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
@@ -190,7 +192,7 @@ const PASSES: &[PassTemplate] = &[
         kernel: "resolve_temporal",
         stage: Stage::Denoise,
         grid: GridTemplate::List(0),
-        overrides: &["FALLBACK"],
+        overrides: &["FALLBACK", "SPATIAL_FILTER", "HISTORY_CLIP", "AVERAGE_MIXING", "AVERAGE_IS_READ"],
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_environment", "environment", Current),
@@ -242,7 +244,7 @@ pub(crate) const RAY_ARGS: u64 = 2;
 pub(crate) const ARGS_STRIDE: u64 = 16;
 
 fn override_value(settings: &Settings, name: &str) -> f64 {
-    let ray_list = settings.coverage.ray_list.as_ref();
+    let (ray_list, features) = (settings.coverage.ray_list.as_ref(), &settings.features);
     match name {
         "NORMAL_ENCODING" => match settings.conventions.normal {
             NormalEncoding::Signed => 0.0,
@@ -264,6 +266,16 @@ fn override_value(settings: &Settings, name: &str) -> f64 {
             Some(RaysPerQuad::Four) => 4.0,
         },
         "RAYS_FOLLOW_VARIANCE" => f64::from(ray_list.is_some_and(|list| list.variance_threshold.is_some())),
+        "ROUGHNESS_IS_CONSTANT" => f64::from(features.constant_roughness.is_some()),
+        "AVERAGE_IS_USED" => f64::from(features.uses_average()),
+        "AVERAGE_IS_READ" => f64::from(features.history_clip || features.average_mixing),
+        "MIRROR_PARALLAX" => f64::from(features.mirror_parallax),
+        "SURFACE_MOTION" => f64::from(features.surface_motion),
+        "HISTORY_SEARCH" => f64::from(features.history_search),
+        "EDGE_REPAIR" => f64::from(features.edge_repair),
+        "SPATIAL_FILTER" => f64::from(features.spatial_filter),
+        "HISTORY_CLIP" => f64::from(features.history_clip),
+        "AVERAGE_MIXING" => f64::from(features.average_mixing),
         "FALLBACK" => match settings.coverage.fallback {
             Fallback::Black => 0.0,
             Fallback::Input => 1.0,
@@ -321,7 +333,8 @@ impl Plan {
         check_allocation(size)?;
         let mut passes = Vec::new();
         let mut kernels = Vec::new();
-        for template in PASSES {
+        let is_needed = |template: &&PassTemplate| template.kernel != "prefilter" || settings.features.spatial_filter;
+        for template in PASSES.iter().filter(is_needed) {
             let (pass, kernel) = plan_pass(template, settings)?;
             passes.push(pass);
             kernels.push(kernel);

@@ -225,6 +225,67 @@ pub struct Number {
     pub high: f32,
 }
 
+/// What is done at all. What is off leaves kernels, bindings, passes and memory; `docs/features.md` says what each
+/// saves and costs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
+pub struct Features {
+    /// Looks for history where the reflected point was, as if it lay behind the surface by the hit distance. For
+    /// mirror-like and flat surfaces. Without it `radiance` needs no hit distance.
+    pub mirror_parallax: bool,
+    /// Looks for history where the surface was. For rough and curved surfaces and moving objects. Without it there
+    /// is no `motion` input, and no comparison with the neighbourhood's colour.
+    pub surface_motion: bool,
+    /// Looks at the 3x3 places around history that does not fit well.
+    pub history_search: bool,
+    /// At edges takes those of four texels that show the same surface.
+    pub edge_repair: bool,
+    /// Blurs the noisy input before it is accumulated. A scene of mirrors has nothing to blur. Without it there is
+    /// no prefilter pass.
+    pub spatial_filter: bool,
+    /// Clips history, and new colour, to what the neighbourhood makes plausible. A scene in which neither light nor
+    /// objects move has nothing to clip. Without it what changes leaves trails.
+    pub history_clip: bool,
+    /// Mixes the 8x8 average into the colour where history is short. Less noise after disocclusion, less detail.
+    pub average_mixing: bool,
+    /// Perceptual roughness, 0 to 1, where it is the same everywhere: then there is no `roughness` input.
+    pub constant_roughness: Option<f32>,
+}
+
+impl Default for Features {
+    fn default() -> Self {
+        Self {
+            mirror_parallax: true,
+            surface_motion: true,
+            history_search: true,
+            edge_repair: true,
+            spatial_filter: true,
+            history_clip: true,
+            average_mixing: true,
+            constant_roughness: None,
+        }
+    }
+}
+
+impl Features {
+    /// Whether any pass uses the 8x8 averages.
+    pub(crate) fn uses_average(&self) -> bool {
+        self.spatial_filter || self.history_clip || self.average_mixing
+    }
+
+    fn validate(&self) -> Result<(), Error> {
+        if !self.mirror_parallax && !self.surface_motion {
+            let reason = "without mirror_parallax and surface_motion there is no history to find";
+            return Err(Error::Features { reason });
+        }
+        if let Some(roughness) = self.constant_roughness {
+            check_range("features.constant_roughness", roughness, 0.0, 1.0, "0 to 1")?;
+        }
+        Ok(())
+    }
+}
+
 /// Declares a group of numeric settings: documentation, name, default, range.
 macro_rules! numeric_settings {
     ($(#[$outer:meta])* $group:ident in $path:literal {
@@ -351,6 +412,8 @@ pub struct Settings {
     pub conventions: Conventions,
     /// Which pixels are denoised.
     pub coverage: Coverage,
+    /// What is done at all.
+    pub features: Features,
     /// Constants of the reproject pass.
     pub reproject: Reproject,
     /// Constants of the prefilter pass.
@@ -376,6 +439,7 @@ impl Settings {
     ///
     /// [`Error::Setting`] for the first one outside.
     pub fn validate(&self) -> Result<(), Error> {
+        self.features.validate()?;
         self.reproject.validate()?;
         self.prefilter.validate()?;
         self.resolve.validate()?;

@@ -10,6 +10,7 @@ use limpid::resource::{Access, Kind};
 use limpid::settings::{Channel, Fallback, NormalEncoding, RayList, RaysPerQuad, RoughnessEncoding};
 use limpid::synchronization::Usage;
 use limpid::{Camera, Denoiser, Error, FrameInputs, Plan, Preset, Settings};
+use limpid_harness::strategy::any_features;
 use proptest::prelude::*;
 
 const SIZE: UVec2 = UVec2::new(1920, 1080);
@@ -24,9 +25,11 @@ fn any_settings() -> impl Strategy<Value = Settings> {
         prop::sample::select(vec![RoughnessEncoding::Perceptual, RoughnessEncoding::Alpha]),
         prop::sample::select(vec![Fallback::Black, Fallback::Input, Fallback::Environment]),
         ray_list,
+        any_features(),
     )
-        .prop_map(|(normal, channel, roughness, fallback, ray_list)| {
+        .prop_map(|(normal, channel, roughness, fallback, ray_list, features)| {
             let mut settings = Settings::default();
+            settings.features = features;
             settings.conventions.normal = normal;
             settings.conventions.roughness_channel = channel;
             settings.conventions.roughness = roughness;
@@ -91,6 +94,13 @@ proptest! {
         }
         let listed: HashSet<_> = plan.resources.iter().map(|r| r.name.clone()).collect();
         prop_assert_eq!(listed, used);
+        // What is off leaves nothing behind.
+        let features = &settings.features;
+        prop_assert_eq!(plan.inputs().any(|i| i == "motion"), features.surface_motion);
+        prop_assert_eq!(plan.inputs().any(|i| i == "roughness"), features.constant_roughness.is_none());
+        prop_assert_eq!(plan.passes.iter().any(|pass| pass.kernel == "prefilter"), features.spatial_filter);
+        let uses_average = features.spatial_filter || features.history_clip || features.average_mixing;
+        prop_assert_eq!(plan.resource("average").is_some(), uses_average);
         prop_assert_eq!(plan.resource("rays").is_some(), settings.coverage.ray_list.is_some());
         prop_assert_eq!(plan.inputs().any(|i| i == "environment"), settings.coverage.fallback == Fallback::Environment);
     }

@@ -60,7 +60,8 @@ struct Frame {
     clip_extent_floor: f32,
     // Steps per frame in which a history length is stored, a whole number.
     history_length_steps: f32,
-    padding: f32,
+    // Roughness of all surfaces, where it is the same for all.
+    constant_roughness: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

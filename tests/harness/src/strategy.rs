@@ -3,7 +3,7 @@
 
 use glam::{Mat4, Quat, UVec2, Vec2, Vec3};
 use limpid::settings::{
-    Channel, DepthEncoding, Fallback, NormalEncoding, Number, RayList, RaysPerQuad, RoughnessEncoding,
+    Channel, DepthEncoding, Fallback, Features, NormalEncoding, Number, RayList, RaysPerQuad, RoughnessEncoding,
 };
 use limpid::{FrameInputs, Preset, Settings};
 use proptest::prelude::*;
@@ -292,6 +292,20 @@ fn number_value(number: &'static Number) -> impl Strategy<Value = f32> {
     prop_oneof![12 => Just(number.default), 1 => Just(number.low), 1 => Just(number.high), 4 => clamped]
 }
 
+/// Features that make sense together.
+pub fn any_features() -> impl Strategy<Value = Features> {
+    let roughness = prop::option::of(select(&[0.0f32, 0.01, 0.447_213_6, 1.0][..]));
+    (prop::array::uniform7(any::<bool>()), roughness).prop_map(|(on, constant_roughness)| {
+        let mut features = Features::default();
+        // One of the two has to be on.
+        (features.mirror_parallax, features.surface_motion) = (on[0] || !on[1], on[1]);
+        (features.history_search, features.edge_repair, features.spatial_filter) = (on[2], on[3], on[4]);
+        (features.history_clip, features.average_mixing) = (on[5], on[6]);
+        features.constant_roughness = constant_roughness;
+        features
+    })
+}
+
 /// Settings with conventions that the harness' images keep to, everything else at random.
 pub fn any_settings() -> impl Strategy<Value = Settings> {
     let rays = select(vec![RaysPerQuad::One, RaysPerQuad::Two, RaysPerQuad::Four]);
@@ -303,8 +317,9 @@ pub fn any_settings() -> impl Strategy<Value = Settings> {
         select(vec![RoughnessEncoding::Perceptual, RoughnessEncoding::Perceptual, RoughnessEncoding::Alpha]);
     let threshold = prop::option::of(select(ROUGHNESS).prop_filter("in range", |v| (0.0..=1.0).contains(v)));
     let numbers: Vec<_> = Settings::numbers().map(number_value).collect();
-    (preset, normal, fallback, roughness, ray_list, threshold, prop::option::of(numbers)).prop_map(
-        |(preset, normal, fallback, roughness, ray_list, threshold, values)| {
+    let values = (prop::option::of(numbers), prop::option::weighted(0.3, any_features()));
+    (preset, normal, fallback, roughness, ray_list, threshold, values).prop_map(
+        |(preset, normal, fallback, roughness, ray_list, threshold, (values, features))| {
             let mut settings = preset.settings();
             for (number, value) in Settings::numbers().zip(values.into_iter().flatten()) {
                 if value != number.default {
@@ -312,6 +327,7 @@ pub fn any_settings() -> impl Strategy<Value = Settings> {
                 }
             }
             settings.reproject.min_history_cap = settings.reproject.min_history_cap.min(settings.reproject.max_history);
+            settings.features = features.unwrap_or_default();
             settings.conventions.depth = DepthEncoding::Linear;
             settings.conventions.normal = normal;
             settings.conventions.roughness = roughness;
