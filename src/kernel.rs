@@ -44,6 +44,12 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     SOURCES.iter().map(|(path, _)| *path).filter(|path| !path.contains('/'))
 }
 
+/// What a kernel says of itself at the top of its file, without comment signs.
+pub(crate) fn header(name: &str) -> Vec<String> {
+    let lines = source(name).unwrap_or_default().lines().map_while(|line| line.strip_prefix("//!"));
+    lines.map(|line| line.strip_prefix(' ').unwrap_or(line).to_owned()).collect()
+}
+
 /// A kernel with the files it imports spliced in, each once.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Linked {
@@ -153,6 +159,8 @@ pub struct Kernel {
     pub info: ModuleInfo,
     /// Its resources, by group and number.
     pub bindings: Vec<Binding>,
+    /// The resources that its source declares, whether specialising kept them or not.
+    pub all_bindings: Vec<Binding>,
     /// Invocations per workgroup.
     pub workgroup_size: [u32; 3],
     /// The source that the spans in `module` are about.
@@ -177,6 +185,13 @@ impl Kernel {
         Self::from_linked(name, &linked, overrides)
     }
 
+    /// A kernel of a test, from one text.
+    #[cfg(test)]
+    pub(crate) fn from_text(name: &'static str, text: &str) -> Result<Self, Error> {
+        let origins = (1..=text.lines().count()).map(|line| ("test.wgsl".to_owned(), line as u32)).collect();
+        Self::from_linked(name, &Linked { text: text.to_owned(), origins }, &Overrides::new())
+    }
+
     fn from_linked(name: &'static str, linked: &Linked, overrides: &Overrides) -> Result<Self, Error> {
         let fail = |stage, report| Error::Kernel { kernel: name, stage, report };
         let line_of = |location: Option<naga::SourceLocation>| location.map(|at| at.line_number);
@@ -197,10 +212,11 @@ impl Kernel {
             .validate(&module)
             .map_err(|e| fail("validate after specialising", DisplayChain(e.as_inner()).to_string()))?;
         let bindings = reflect(&module).map_err(|report| fail("reflect", report))?;
+        let all_bindings = reflect(&parsed).map_err(|report| fail("reflect", report))?;
         let entry_point =
             module.entry_points.first().ok_or_else(|| fail("reflect", format!("there is no entry point `{name}`")))?;
         let workgroup_size = entry_point.workgroup_size;
-        Ok(Self { name, module, info, bindings, workgroup_size, linked: linked.clone() })
+        Ok(Self { name, module, info, bindings, all_bindings, workgroup_size, linked: linked.clone() })
     }
 }
 
@@ -222,11 +238,12 @@ impl std::fmt::Display for DisplayChain<'_> {
 /// Puts the taken side of every `if` on a constant in its place. naga keeps both, and with the dead one every
 /// resource that it mentions.
 fn remove_dead_branches(module: &mut naga::Module) {
+    let flags = constant_flags(module);
     let functions = module.functions.iter_mut().map(|(_, function)| function);
     let entry_points = module.entry_points.iter_mut().map(|entry_point| &mut entry_point.function);
     for function in functions.chain(entry_points) {
         let body = std::mem::take(&mut function.body);
-        function.body = live_block(body, &function.expressions);
+        function.body = live_block(body, &Known { expressions: &function.expressions, flags: &flags });
         // A name keeps its expression alive: only those that are still evaluated may.
         let mut evaluated = HashSet::new();
         collect_evaluated(&function.body, &mut evaluated);
@@ -234,35 +251,53 @@ fn remove_dead_branches(module: &mut naga::Module) {
     }
 }
 
-fn constant_condition(condition: Handle<Expression>, expressions: &naga::Arena<Expression>) -> Option<bool> {
-    match expressions[condition] {
+/// Module-scope constants, overrides that were given a value among them, that are true or false.
+fn constant_flags(module: &naga::Module) -> HashMap<Handle<naga::Constant>, bool> {
+    let flag = |constant: &naga::Constant| match module.global_expressions[constant.init] {
         Expression::Literal(Literal::Bool(value)) => Some(value),
         _ => None,
+    };
+    module.constants.iter().filter_map(|(handle, constant)| Some((handle, flag(constant)?))).collect()
+}
+
+/// Expressions of a function and the constants that they may name.
+struct Known<'a> {
+    expressions: &'a naga::Arena<Expression>,
+    flags: &'a HashMap<Handle<naga::Constant>, bool>,
+}
+
+impl Known<'_> {
+    fn condition(&self, condition: Handle<Expression>) -> Option<bool> {
+        match self.expressions[condition] {
+            Expression::Literal(Literal::Bool(value)) => Some(value),
+            Expression::Constant(constant) => self.flags.get(&constant).copied(),
+            _ => None,
+        }
     }
 }
 
-fn live_block(block: naga::Block, expressions: &naga::Arena<Expression>) -> naga::Block {
+fn live_block(block: naga::Block, known: &Known) -> naga::Block {
     let mut live = naga::Block::new();
     for (statement, span) in block.span_into_iter() {
         match statement {
-            Statement::If { condition, accept, reject } => match constant_condition(condition, expressions) {
-                Some(taken) => live.extend_block(live_block(if taken { accept } else { reject }, expressions)),
+            Statement::If { condition, accept, reject } => match known.condition(condition) {
+                Some(taken) => live.extend_block(live_block(if taken { accept } else { reject }, known)),
                 None => {
-                    let accept = live_block(accept, expressions);
-                    let reject = live_block(reject, expressions);
+                    let accept = live_block(accept, known);
+                    let reject = live_block(reject, known);
                     live.push(Statement::If { condition, accept, reject }, span);
                 }
             },
-            Statement::Block(inner) => live.push(Statement::Block(live_block(inner, expressions)), span),
+            Statement::Block(inner) => live.push(Statement::Block(live_block(inner, known)), span),
             Statement::Loop { body, continuing, break_if } => {
-                let body = live_block(body, expressions);
-                let continuing = live_block(continuing, expressions);
+                let body = live_block(body, known);
+                let continuing = live_block(continuing, known);
                 live.push(Statement::Loop { body, continuing, break_if }, span);
             }
             Statement::Switch { selector, cases } => {
                 let cases = cases
                     .into_iter()
-                    .map(|case| naga::SwitchCase { body: live_block(case.body, expressions), ..case })
+                    .map(|case| naga::SwitchCase { body: live_block(case.body, known), ..case })
                     .collect();
                 live.push(Statement::Switch { selector, cases }, span);
             }
