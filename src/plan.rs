@@ -13,6 +13,7 @@ use crate::settings::{Channel, Fallback, NormalEncoding, RaysPerQuad, RoughnessE
 
 /// When in the frame a pass runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Stage {
     /// Before the renderer traces its rays.
@@ -72,6 +73,7 @@ pub struct Pass {
 
 /// Memory that limpid allocates, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
 pub struct Memory {
     /// Kept from frame to frame.
     pub persistent: u64,

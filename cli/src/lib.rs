@@ -5,6 +5,7 @@
 
 pub mod backend;
 pub mod commands;
+pub mod export;
 pub mod metrics;
 pub mod picture;
 pub mod scene;

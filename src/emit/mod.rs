@@ -4,6 +4,8 @@ mod spirv;
 mod text;
 
 pub use spirv::{SpirvOptions, SpirvVersion};
+#[cfg(feature = "export")]
+pub(crate) use text::Note;
 pub use text::{GlslDialect, GlslOptions, HlslOptions, MslOptions, ShaderModel, WgslOptions};
 
 /// What a kernel does where it goes beyond what it may, for example reads outside of a texture.

@@ -2,6 +2,7 @@
 
 mod demo;
 mod denoise;
+mod export;
 mod plan;
 mod report;
 mod settings;
@@ -26,6 +27,8 @@ enum Command {
     Demo(demo::Demo),
     /// Denoises a sequence of EXR frames.
     Denoise(denoise::Denoise),
+    /// Writes shaders, tables and documents for engines that do not link Rust.
+    Export(Box<export::Export>),
     /// Prints what is allocated and dispatched for some settings and size.
     Plan(plan::PlanCommand),
 }
@@ -40,6 +43,7 @@ impl Cli {
         match self.command {
             Command::Demo(demo) => demo.run(),
             Command::Denoise(denoise) => denoise.run(),
+            Command::Export(export) => export.run(),
             Command::Plan(plan) => plan.run(),
         }
     }

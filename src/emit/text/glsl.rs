@@ -17,6 +17,7 @@ use crate::resource::{Access, Format};
 pub enum GlslDialect {
     /// OpenGL 4.5: texture units, image units and buffer bindings are counted apart.
     #[default]
+    #[serde(rename = "opengl")]
     OpenGl,
     /// Vulkan: sets and bindings, textures without samplers.
     Vulkan,

@@ -13,14 +13,16 @@ use crate::resource::{Access, Format};
 /// What HLSL is written for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
 pub enum ShaderModel {
     /// 5.1, for FXC.
+    #[serde(rename = "5.1")]
     V5_1,
     /// 6.0, for DXC.
+    #[serde(rename = "6.0")]
     #[default]
     V6_0,
     /// 6.2 with `-enable-16bit-types`: packing to half floats converts to `float16_t` and rounds to the nearest.
+    #[serde(rename = "6.2-16bit")]
     V6_2Half,
 }
 
