@@ -7,11 +7,11 @@ use serde::Serialize;
 
 use super::formats::{self, FormatNames};
 use super::{Export, File, Options, Target, sha256};
-use crate::FrameConstants;
 use crate::kernel::{Binding, BindingKind, Kernel, Overrides};
 use crate::plan::{Bound, Grid, Pass, Stage};
 use crate::resource::{Access, Copy, Count, Extent, Kind, Lifetime, Resource, TILE_SIZE};
 use crate::synchronization::{Barrier, Usage};
+use crate::{FrameConstants, Settings};
 
 /// All that an export says about itself. Enough to write a backend from.
 ///
@@ -26,7 +26,8 @@ pub struct Manifest {
     /// Licence of all files.
     pub licence: &'static str,
     /// Settings that were exported.
-    pub settings: serde_json::Value,
+    #[schemars(with = "serde_json::Value")]
+    pub settings: Settings,
     /// Short hash of them, also at the top of every shader.
     pub settings_hash: String,
     /// Options that were given.
@@ -360,7 +361,7 @@ impl Export<'_> {
             manifest_version: 1,
             limpid_version: env!("CARGO_PKG_VERSION"),
             licence: "MIT OR Apache-2.0",
-            settings: serde_json::to_value(self.settings).unwrap_or_default(),
+            settings: self.settings.clone(),
             settings_hash: self.settings_hash.clone(),
             options: self.options.clone(),
             tile_size: TILE_SIZE,
@@ -467,6 +468,10 @@ impl Export<'_> {
         let has = |target| self.options.targets.contains(&target);
         let options = self.options;
         let usage = Usages::of(binding.kind);
+        let is_grid =
+            |pass: &Pass| matches!(&pass.grid, Grid::Indirect { resource, .. } if *resource == bound.resource);
+        let is_read_grid = bound.access == Access::Read && self.plan.passes.iter().any(is_grid);
+        let state = if is_read_grid { SRV_AND_INDIRECT } else { usage.state };
         let (class, register, space) = options.hlsl.register(binding);
         let (table, index) = options.msl.slot_of(kernel, binding);
         let (set, number) = options.glsl.slot_of(kernel, binding);
@@ -476,13 +481,7 @@ impl Export<'_> {
             resource: bound.resource.clone(),
             copy: bound.copy,
             access: bound.access,
-            hlsl: has(Target::Hlsl).then_some(Register {
-                class,
-                register,
-                space,
-                view: usage.view,
-                state: usage.state,
-            }),
+            hlsl: has(Target::Hlsl).then_some(Register { class, register, space, view: usage.view, state }),
             spirv: has(Target::Spirv).then_some(Descriptor {
                 set: options.spirv.first_set + binding.group,
                 binding: options.spirv.first_binding + binding.binding,
@@ -514,6 +513,9 @@ struct Usages {
 }
 
 const UAV: &str = "D3D12_RESOURCE_STATE_UNORDERED_ACCESS";
+/// Of a buffer that grids are read from while kernels read it too.
+const SRV_AND_INDIRECT: &str =
+    "D3D12_RESOURCE_STATE_NON_PIXEL_SHADER_RESOURCE | D3D12_RESOURCE_STATE_INDIRECT_ARGUMENT";
 const SRV: &str = "D3D12_RESOURCE_STATE_NON_PIXEL_SHADER_RESOURCE";
 
 impl Usages {
