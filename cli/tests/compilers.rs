@@ -268,3 +268,36 @@ fn wgsl_compiles_with_tint() {
     let messages = tools::run("node", &arguments);
     assert!(messages.contains(&format!("{} files without a remark", files.len())), "{messages}");
 }
+
+/// There is no compiler for Metal on Linux. A C++ compiler with a small stand-in for Metal's library checks names and
+/// types; address spaces, attributes and limits are left to `.github/workflows/metal.yml`.
+#[test]
+fn msl_has_the_right_types() {
+    if !tools::has("clang++-14") {
+        return;
+    }
+    let folder = Folder::new("msl");
+    let library = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/tools");
+    for settings in settings() {
+        let exported = Exported::new(&settings, &only(Target::Msl));
+        for pass in exported.passes() {
+            let path = folder.join("pass.cpp");
+            fs::write(&path, exported.shader(pass, Target::Msl).0).unwrap();
+            let warnings =
+                ["-Wall", "-Wextra", "-Wshadow", "-Werror", "-Wno-unknown-attributes", "-Wno-ignored-attributes"];
+            let mode = ["-std=c++17", "-fsyntax-only", "-fdeclspec", "-x", "c++", "-I", library.to_str().unwrap()];
+            tools::run("clang++-14", &[&mode[..], &warnings, &[path.to_str().unwrap()]].concat());
+            let text = fs::read_to_string(&path).unwrap();
+            for binding in pass["bindings"].as_array().unwrap() {
+                let at = &binding["msl"];
+                let argument = format!(
+                    "{} [[{}({})]]",
+                    binding["variable"].as_str().unwrap(),
+                    at["table"].as_str().unwrap(),
+                    at["index"]
+                );
+                assert!(text.contains(&argument), "{}: {argument}", pass["name"]);
+            }
+        }
+    }
+}

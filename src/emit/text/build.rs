@@ -39,6 +39,8 @@ struct Builder<'a> {
     conditions: HashMap<Handle<LocalVariable>, ShortCircuit>,
     /// How often nameless variables are set.
     stores: HashMap<Handle<LocalVariable>, usize>,
+    /// Variables that are read at all.
+    read: HashSet<Place>,
     /// What those stand for that are set once.
     values: HashMap<Handle<LocalVariable>, Handle<Expression>>,
 }
@@ -50,7 +52,7 @@ struct Builder<'a> {
 /// Names what it does not know.
 pub(super) fn outline(function: &Function, effects: &Effects) -> Result<Outline, String> {
     let mut uses = HashMap::new();
-    count_uses(&function.body, function, &mut uses);
+    count_uses(&function.body, function, effects, &mut uses);
     let mut stores = HashMap::new();
     count_stores(&function.body, function, &mut stores);
     let mut builder = Builder {
@@ -61,8 +63,10 @@ pub(super) fn outline(function: &Function, effects: &Effects) -> Result<Outline,
         pending: Vec::new(),
         conditions: HashMap::new(),
         stores,
+        read: HashSet::new(),
         values: HashMap::new(),
     };
+    builder.read = builder.places_read();
     let mut body = builder.block(&function.body)?;
     drop_last_return(&mut body);
     let mut outline = builder.outline;
@@ -144,6 +148,14 @@ impl Builder<'_> {
             open.extend(self.outline.operands(self.function, at));
         }
         reads
+    }
+
+    fn places_read(&self) -> HashSet<Place> {
+        let loads = self.function.expressions.iter().filter_map(|(handle, expression)| match *expression {
+            Expression::Load { pointer } if self.uses.contains_key(&handle) => self.place(pointer),
+            _ => None,
+        });
+        loads.collect()
     }
 
     fn place(&self, pointer: Handle<Expression>) -> Option<Place> {
@@ -298,7 +310,12 @@ impl Builder<'_> {
             self.values.insert(local, value);
             return;
         }
-        let writes = self.place(pointer).into_iter().collect();
+        let place = self.place(pointer);
+        if matches!(place, Some(Place::Local(_))) && place.is_none_or(|place| !self.read.contains(&place)) {
+            // Nobody ever looks.
+            return [pointer, value].into_iter().for_each(|expression| self.consume(expression));
+        }
+        let writes = place.into_iter().collect();
         let mut node = Node::Assign { pointer, operator: None, value };
         // What is changed is read on the left side of the operation, at this very place.
         if let Expression::Binary { op, left, right } = *self.expression(value)
@@ -333,6 +350,7 @@ impl Builder<'_> {
         span: Span,
         lines: &mut Vec<Line>,
     ) {
+        let arguments = &self.effects.arguments(function, arguments)[..];
         let effects = self.effects.of(function);
         let writes: HashSet<Place> = effects.writes.iter().map(|&global| Place::Global(global)).collect();
         let Some(result) = result else {

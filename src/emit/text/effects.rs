@@ -4,6 +4,8 @@ use std::collections::{BTreeSet, HashMap};
 
 use naga::{Block, Expression, Function, GlobalVariable, Handle, ImageQuery, Module, SampleLevel, Statement};
 
+use super::uses::count_uses;
+
 /// What a function does beyond computing its result, the functions it calls included.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Effect {
@@ -13,6 +15,8 @@ pub(super) struct Effect {
     pub(super) globals: BTreeSet<Handle<GlobalVariable>>,
     /// Whether it has a barrier.
     pub(super) waits: bool,
+    /// Which arguments matter.
+    pub(super) used_arguments: Vec<bool>,
 }
 
 /// The effects of all functions of a module.
@@ -24,7 +28,15 @@ impl Effects {
         let mut effects = Self(HashMap::new());
         // Functions stand before those that call them.
         for (handle, function) in module.functions.iter() {
-            let effect = effects.find(function);
+            let mut effect = effects.find(function);
+            let mut uses = HashMap::new();
+            count_uses(&function.body, function, &effects, &mut uses);
+            effect.used_arguments = vec![false; function.arguments.len()];
+            for (expression, count) in uses {
+                if let Expression::FunctionArgument(index) = function.expressions[expression] {
+                    effect.used_arguments[index as usize] |= count > 0;
+                }
+            }
             effects.0.insert(handle, effect);
         }
         effects
@@ -32,6 +44,16 @@ impl Effects {
 
     pub(super) fn of(&self, function: Handle<Function>) -> &Effect {
         &self.0[&function]
+    }
+
+    /// The arguments of a call that matter.
+    pub(super) fn arguments(
+        &self,
+        function: Handle<Function>,
+        arguments: &[Handle<Expression>],
+    ) -> Vec<Handle<Expression>> {
+        let used = arguments.iter().zip(&self.of(function).used_arguments);
+        used.filter(|(_, used)| **used).map(|(argument, _)| *argument).collect()
     }
 
     /// The effect of a function whose callees are known.

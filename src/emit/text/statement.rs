@@ -19,7 +19,12 @@ impl<'a> Writer<'a> {
         let mut scope = self.scope(function, &self.kernel.info[handle], outline);
         self.names.enter();
         let mut arguments = Vec::new();
-        for argument in &function.arguments {
+        let used = self.effects.of(handle).used_arguments.clone();
+        for (argument, is_used) in function.arguments.iter().zip(used) {
+            if !is_used {
+                scope.arguments.push(String::new());
+                continue;
+            }
             let name = self.names.declare(argument.name.as_deref().unwrap_or("value"));
             arguments.push((self.type_name(argument.ty)?, name.clone()));
             scope.arguments.push(name);

@@ -55,6 +55,11 @@ fn loops_and_conditions_look_like_the_sources() {
 }
 
 #[test]
+fn variables_that_nobody_reads_are_left_out() {
+    assert_eq!(written("var a = 1u; a = data[0]; data[1] = 2u;"), "data[1] = 2u;\n");
+}
+
+#[test]
 fn what_has_no_text_form_is_refused_by_name() {
     let text = "@group(0) @binding(0) var<storage, read_write> data: array<u32, 8>;\n\
          @compute @workgroup_size(1)\nfn fill() {\n switch data[0] { case 1u: { data[1] = 1u; } default: {} }\n}\n";

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use naga::{Block, Expression, Function, Handle, LocalVariable, Statement};
 
-use super::effects::operands;
+use super::effects::{Effects, operands};
 
 /// How often each variable is set as a whole.
 pub(super) fn count_stores(block: &Block, function: &Function, stores: &mut HashMap<Handle<LocalVariable>, usize>) {
@@ -30,30 +30,35 @@ pub(super) fn count_stores(block: &Block, function: &Function, stores: &mut Hash
 }
 
 /// How often each expression is used.
-pub(super) fn count_uses(block: &Block, function: &Function, uses: &mut HashMap<Handle<Expression>, usize>) {
+pub(super) fn count_uses(
+    block: &Block,
+    function: &Function,
+    effects: &Effects,
+    uses: &mut HashMap<Handle<Expression>, usize>,
+) {
     for statement in block.iter() {
         let used = match statement {
             Statement::Emit(range) => {
                 range.clone().flat_map(|expression| operands(&function.expressions[expression])).collect()
             }
             Statement::Block(inner) => {
-                count_uses(inner, function, uses);
+                count_uses(inner, function, effects, uses);
                 Vec::new()
             }
             Statement::If { condition, accept, reject } => {
-                count_uses(accept, function, uses);
-                count_uses(reject, function, uses);
+                count_uses(accept, function, effects, uses);
+                count_uses(reject, function, effects, uses);
                 vec![*condition]
             }
             Statement::Loop { body, continuing, break_if } => {
-                count_uses(body, function, uses);
-                count_uses(continuing, function, uses);
+                count_uses(body, function, effects, uses);
+                count_uses(continuing, function, effects, uses);
                 break_if.iter().copied().collect()
             }
             Statement::Return { value } => value.iter().copied().collect(),
             Statement::Store { pointer, value } | Statement::Atomic { pointer, value, .. } => vec![*pointer, *value],
             Statement::ImageStore { image, coordinate, value, .. } => vec![*image, *coordinate, *value],
-            Statement::Call { arguments, .. } => arguments.clone(),
+            Statement::Call { function, arguments, .. } => effects.arguments(*function, arguments),
             _ => Vec::new(),
         };
         for expression in used {
