@@ -1,7 +1,7 @@
 //! Kernels in other languages, whatever the settings.
 
 use glam::UVec2;
-use limpid::emit::{GlslDialect, GlslOptions, HlslOptions, MslOptions, ShaderModel, SpirvOptions, WgslOptions};
+use limpid::emit::{Checks, GlslDialect, GlslOptions, HlslOptions, MslOptions, ShaderModel, SpirvOptions, WgslOptions};
 use limpid::kernel::Kernel;
 use limpid::{Error, Plan, Settings};
 use proptest::prelude::*;
@@ -59,6 +59,9 @@ proptest! {
                 let text = write(kernel).unwrap();
                 check_text(kernel, &text);
                 prop_assert_eq!(&text, &write(kernel).unwrap(), "the same again");
+            }
+            for checks in [Checks::Unchecked, Checks::Robust] {
+                kernel.spirv(&SpirvOptions { checks, ..SpirvOptions::default() }).unwrap();
             }
             let module = parsed(&kernel.wgsl(&WgslOptions { first_group: 2, first_binding: 3 }).unwrap());
             let mut bindings: Vec<_> = module.global_variables.iter().filter_map(|(_, v)| v.binding).collect();
