@@ -35,8 +35,8 @@ fn values_stay_ahead_of_what_changes_them() {
 #[test]
 fn loops_and_conditions_look_like_the_sources() {
     for text in [
-        "for (var i: u32 = 0u; i < 4u; i++) {\ndata[i] += 2u;\n}\n",
-        "var i: u32 = data[0];\nwhile i < 4u {\ni += data[i];\n}\ndata[1] = i;\n",
+        "for (var i = 0u; i < 4u; i++) {\ndata[i] += 2u;\n}\n",
+        "var i = data[0];\nwhile i < 4u {\ni += data[i];\n}\ndata[1] = i;\n",
         "if data[0] < 2u && look() == 3u || data[1] > 4u {\ndata[2] = 1u;\n}\n",
         "if data[0] == 1u {\ndata[1] = 2u;\n} else if data[0] == 2u {\ndata[1] = 3u;\n} else {\ndata[1] = 4u;\n}\n",
         "data[0] = (data[1] + 2u) * 3u - (data[2] - data[3]);\n",
@@ -49,9 +49,9 @@ fn loops_and_conditions_look_like_the_sources() {
     }
     // A variable of a loop's body begins anew each time; one that outlives it does not.
     let text = written("for (var i = 0u; i < 2u; i++) { var s = 0u; s += i; data[i] = s; }");
-    assert_eq!(text, "for (var i: u32 = 0u; i < 2u; i++) {\nvar s: u32 = 0u;\ns += i;\ndata[i] = s;\n}\n");
+    assert_eq!(text, "for (var i = 0u; i < 2u; i++) {\nvar s = 0u;\ns += i;\ndata[i] = s;\n}\n");
     let text = written("var s = 0u; for (var i = 0u; i < 2u; i++) { s += i; data[i] = s; }");
-    assert_eq!(text, "var s: u32 = 0u;\nfor (var i: u32 = 0u; i < 2u; i++) {\ns += i;\ndata[i] = s;\n}\n");
+    assert_eq!(text, "var s = 0u;\nfor (var i = 0u; i < 2u; i++) {\ns += i;\ndata[i] = s;\n}\n");
 }
 
 #[test]

@@ -171,8 +171,8 @@ impl Language for WgslOptions {
         format!("let {name} = {value};")
     }
 
-    fn variable(&self, ty: &str, name: &str, value: &str) -> String {
-        format!("var {name}: {ty} = {value};")
+    fn variable(&self, _ty: &str, name: &str, value: &str) -> String {
+        format!("var {name} = {value};")
     }
 
     fn array_variable(&self, ty: &str, name: &str, count: u32) -> String {
