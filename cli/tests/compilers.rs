@@ -88,6 +88,11 @@ fn spirv_is_valid_in_every_environment_and_binds_what_the_manifest_says() {
                 let path = path.to_str().unwrap();
                 tools::run("spirv-val", &["--target-env", environment, path]);
                 let text = tools::run("spirv-dis", &[path]);
+                // All that INTEGRATION.md tells to enable.
+                let capabilities: BTreeSet<_> =
+                    text.lines().filter_map(|line| line.trim().strip_prefix("OpCapability ")).collect();
+                let known = ["Shader", "ImageQuery", "StorageImageExtendedFormats"];
+                assert!(capabilities.iter().all(|capability| known.contains(capability)), "{capabilities:?}");
                 let decoration = |kind: &str| -> BTreeMap<String, String> {
                     let lines = text.lines().filter_map(|line| {
                         let mut words = line.split_whitespace();

@@ -47,7 +47,7 @@ impl Export<'_> {
              #include <float.h>\n#include <math.h>\n#include <stddef.h>\n#include <stdint.h>\n#include <string.h>\n\n\
              #ifdef __cplusplus\n#define LIMPID_STATIC_ASSERT static_assert\n#else\n\
              #define LIMPID_STATIC_ASSERT _Static_assert\n#endif\n\n#define LIMPID_TILE_SIZE 8u\n\
-             #define LIMPID_SETTINGS_HASH \"{}\"\n\n",
+             #define LIMPID_VERSION \"{0}\"\n#define LIMPID_SETTINGS_HASH \"{}\"\n\n",
             env!("CARGO_PKG_VERSION"),
             self.settings_hash,
             self.settings_hash,
@@ -86,7 +86,7 @@ impl Export<'_> {
         let mut text = "/* How `depth` is encoded. */\nenum {\n    LIMPID_DEPTH_DEVICE = 0, /* 0 near, 1 far */\n    \
             LIMPID_DEPTH_REVERSED_DEVICE = 1, /* 1 near, 0 far */\n    LIMPID_DEPTH_LINEAR = 2 /* along the view axis */\n};\n\n\
             /* Direction of y in clip space. */\nenum { LIMPID_NDC_Y_UP = 0, LIMPID_NDC_Y_DOWN = 1 };\n\n\
-            /* Settings that may change every frame: meanings and ranges are in manifest.json and limpid's documentation. */\n\
+            /* Settings that may change every frame: meanings and ranges are in the documentation of limpid::Settings. */\n\
             typedef struct LimpidSettings {\n    int depth; /* LIMPID_DEPTH_ */\n    int ndc_y; /* LIMPID_NDC_Y_ */\n    \
             int motion_includes_jitter;\n    float sky_distance;\n    float motion_scale[2];\n    \
             float environment_from_world[9]; /* column by column */\n    float neighborhood_falloff;\n"

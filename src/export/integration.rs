@@ -36,7 +36,7 @@ fn words(target: Target) -> Words {
         },
         Target::Spirv => Words {
             api: "Vulkan",
-            pipeline: "Make a compute pipeline of each module; its entry point is the pass's name. Set 0 holds the constants and your images, set 1 what limpid owns. No device feature beyond Vulkan 1.0 is needed.",
+            pipeline: "Make a compute pipeline of each module; its entry point is the pass's name. Set 0 holds the constants and your images, set 1 what limpid owns. Vulkan 1.0 will do, with the device feature `shaderStorageImageExtendedFormats` for `rg32ui`.",
             bind: "Two sets of group 1 a pass, one for even and one for odd frames, serve all frames.",
             barrier: "A barrier is one `vkCmdPipelineBarrier` with a `VkMemoryBarrier`, compute stage to compute stage, and to `VK_PIPELINE_STAGE_DRAW_INDIRECT_BIT` with `VK_ACCESS_INDIRECT_COMMAND_READ_BIT` where it says so. Keep limpid's images in `VK_IMAGE_LAYOUT_GENERAL`: no layout transitions are needed then.",
             clear: "`vkCmdClearColorImage` and `vkCmdFillBuffer` with zeros",
@@ -96,13 +96,13 @@ impl Export<'_> {
         let list = |names: &mut dyn Iterator<Item = String>| names.collect::<Vec<_>>().join(", ");
         let rays = match self.plan.resource("rays") {
             Some(_) => {
-                "Trace the rays of `rays`, 64 a workgroup, from the grid at byte 32 of `args`; the fourth word there is their number (`limpid.hlsli` unpacks them). Write each result to its pixel of `radiance` and to the neighbours that its entry names."
+                "Trace the rays of `rays`, 64 a workgroup, from the grid at byte 32 of `args`; the fourth word there is their number. An entry holds x in bits 0 to 13 and y in bits 14 to 27. Write the result to that pixel of `radiance` and, where bit 28, 29 or 30 is set, to the pixel beside it (x ^ 1), above or below it (y ^ 1) or across (both)."
             }
             None => "Trace a ray for every pixel that reflects into `radiance`.",
         };
         format!(
             "## Steps\n\n1. {}\n2. Allocate the resources below; those with two copies twice. Before the first frame, and after a resize, set \
-             what is persistent to zero: {}.\n3. Every frame, fill a constant buffer of {} bytes with `limpid_fill_constants` of `limpid.h`. Count \
+             what is persistent to zero: {}.\n3. Every frame, fill a constant buffer of {} bytes with `limpid_fill_constants` of `limpid.h`, from this frame's camera and the camera and size of the frame that was denoised last. Count \
              frames: in frame `n` the current copy of a pair is `n % 2`, the previous one the other.\n4. Dispatch {}.\n5. {rays} \
              Your images: {}.\n6. Dispatch {}. The result is in `output`, which is also next frame's history: leave it as it is.\n\n",
             words.pipeline,
