@@ -1,8 +1,6 @@
 //! The CPU and a device give the same, resource by resource, over the built-in scenes.
 
 use std::collections::BTreeMap;
-use std::io::Write;
-use std::sync::mpsc;
 
 use glam::UVec2;
 use half::f16;
@@ -12,6 +10,9 @@ use limpid::{FrameInputs, Plan, Settings};
 use limpid_cli::scene;
 use limpid_cli::sequence::Frame;
 use limpid_cpu::{TexelFormat, Texture};
+
+mod device;
+use device::Device;
 
 const SIZE: UVec2 = UVec2::new(120, 68);
 const FRAMES: u32 = 6;
@@ -32,71 +33,6 @@ fn images(frame: &Frame) -> Vec<(wgpu::TextureFormat, TexelFormat, Vec<u32>)> {
         (wgpu::TextureFormat::R32Float, TexelFormat::R32Float, bits(&frame.depth)),
         (wgpu::TextureFormat::Rg32Float, TexelFormat::Rg32Float, bits(frame.motion.as_flattened())),
     ]
-}
-
-struct Device {
-    device: wgpu::Device,
-    queue: wgpu::Queue,
-}
-
-impl Device {
-    fn open() -> Option<Self> {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-        let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()));
-        let adapter = match adapter {
-            Ok(adapter) => adapter,
-            Err(error) => {
-                assert!(std::env::var_os("LIMPID_REQUIRE_DEVICE").is_none(), "{error}");
-                // Past the harness, which keeps to itself what a passing test prints.
-                let _ = writeln!(std::io::stderr(), "SKIPPED: {error}");
-                return None;
-            }
-        };
-        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor::default())).unwrap();
-        Some(Self { device, queue })
-    }
-
-    fn upload(&self, format: wgpu::TextureFormat, words: &[u32]) -> wgpu::TextureView {
-        let texture = self.device.create_texture(&wgpu::TextureDescriptor {
-            label: None,
-            size: wgpu::Extent3d { width: SIZE.x, height: SIZE.y, depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
-        let bytes_per_row = Some(words.len() as u32 * 4 / SIZE.y);
-        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row, rows_per_image: None };
-        self.queue.write_texture(texture.as_image_copy(), bytemuck::cast_slice(words), layout, texture.size());
-        texture.create_view(&wgpu::TextureViewDescriptor::default())
-    }
-
-    fn words(&self, texture: &wgpu::Texture) -> Vec<u32> {
-        let row = texture.width() * texture.format().block_copy_size(None).unwrap();
-        let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: None,
-            size: u64::from(padded) * u64::from(texture.height()),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: None };
-        let target = wgpu::TexelCopyBufferInfo { buffer: &buffer, layout };
-        encoder.copy_texture_to_buffer(texture.as_image_copy(), target, texture.size());
-        self.queue.submit([encoder.finish()]);
-        let (sender, receiver) = mpsc::channel();
-        buffer.map_async(wgpu::MapMode::Read, .., move |result| sender.send(result).unwrap());
-        self.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
-        receiver.recv().unwrap().unwrap();
-        let bytes = buffer.get_mapped_range(..).unwrap().to_vec();
-        bytes
-            .chunks_exact(padded as usize)
-            .flat_map(|r| bytemuck::pod_collect_to_vec::<u8, u32>(&r[..row as usize]))
-            .collect()
-    }
 }
 
 /// Agreement of one resource.
@@ -177,7 +113,7 @@ fn the_cpu_and_a_device_agree_in_every_resource() {
             let mut inputs = FrameInputs::new(frame.camera, SIZE);
             inputs.reset = frame.reset;
             let images = images(&frame);
-            let views: Vec<_> = images.iter().map(|(format, _, words)| device.upload(*format, words)).collect();
+            let views: Vec<_> = images.iter().map(|(format, _, words)| device.upload(SIZE, *format, words)).collect();
             let textures: Vec<_> = images
                 .into_iter()
                 .map(|(_, format, words)| {
