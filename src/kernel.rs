@@ -1,6 +1,8 @@
 //! Kernels: WGSL sources, linked, specialised and reflected. No graphics API is involved.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::PathBuf;
 
 use naga::back::pipeline_constants::process_overrides;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
@@ -35,19 +37,35 @@ const SOURCES: &[(&str, &str)] = sources![
 /// Values of a kernel's `override` constants.
 pub type Overrides = BTreeMap<String, f64>;
 
-fn source(path: &str) -> Option<&'static str> {
-    SOURCES.iter().find(|(name, _)| *name == path).map(|(_, text)| *text)
+/// Where the texts of kernels come from.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Sources {
+    /// Those that this crate was built with.
+    #[default]
+    BuiltIn,
+    /// Files in a folder laid out as `kernels/`, for those who edit them.
+    Folder(PathBuf),
+}
+
+impl Sources {
+    fn read(&self, path: &str) -> Result<Cow<'static, str>, String> {
+        match self {
+            Self::BuiltIn => {
+                let found = SOURCES.iter().find(|(name, _)| *name == path);
+                found.map(|(_, text)| Cow::Borrowed(*text)).ok_or_else(|| format!("there is no kernels/{path}.wgsl"))
+            }
+            Self::Folder(folder) => {
+                let file = folder.join(format!("{path}.wgsl"));
+                let text = std::fs::read_to_string(&file);
+                text.map(Cow::Owned).map_err(|error| format!("cannot read {}: {error}", file.display()))
+            }
+        }
+    }
 }
 
 /// Names of all kernels.
 pub fn names() -> impl Iterator<Item = &'static str> {
     SOURCES.iter().map(|(path, _)| *path).filter(|path| !path.contains('/'))
-}
-
-/// What a kernel says of itself at the top of its file, without comment signs.
-pub(crate) fn header(name: &str) -> Vec<String> {
-    let lines = source(name).unwrap_or_default().lines().map_while(|line| line.strip_prefix("//!"));
-    lines.map(|line| line.strip_prefix(' ').unwrap_or(line).to_owned()).collect()
 }
 
 /// A kernel with the files it imports spliced in, each once.
@@ -75,14 +93,14 @@ impl Linked {
     }
 }
 
-fn splice(path: &str, linked: &mut Linked, seen: &mut HashSet<String>) -> Result<(), String> {
+fn splice(path: &str, sources: &Sources, linked: &mut Linked, seen: &mut HashSet<String>) -> Result<(), String> {
     if !seen.insert(path.to_owned()) {
         return Ok(());
     }
-    let text = source(path).ok_or_else(|| format!("there is no kernels/{path}.wgsl"))?;
+    let text = sources.read(path)?;
     for (index, line) in text.lines().enumerate() {
         if let Some(import) = line.strip_prefix("import package::") {
-            splice(&import.trim_end_matches(';').replace("::", "/"), linked, seen)?;
+            splice(&import.trim_end_matches(';').replace("::", "/"), sources, linked, seen)?;
             continue;
         }
         // Headers are documentation comments of the file, which WGSL has no notion of.
@@ -98,9 +116,9 @@ fn splice(path: &str, linked: &mut Linked, seen: &mut HashSet<String>) -> Result
 /// # Errors
 ///
 /// [`Error::Kernel`] for a name that does not exist or an import that leads nowhere.
-pub fn link(kernel: &'static str) -> Result<Linked, Error> {
+pub fn link(kernel: &'static str, sources: &Sources) -> Result<Linked, Error> {
     let mut linked = Linked { text: String::new(), origins: Vec::new() };
-    splice(kernel, &mut linked, &mut HashSet::new()).map_err(|report| Error::Kernel {
+    splice(kernel, sources, &mut linked, &mut HashSet::new()).map_err(|report| Error::Kernel {
         kernel,
         stage: "link",
         report,
@@ -181,8 +199,22 @@ impl Kernel {
     ///
     /// [`Error::Kernel`] with file and line where they are known.
     pub fn new(name: &'static str, overrides: &Overrides) -> Result<Self, Error> {
-        let linked = link(name)?;
-        Self::from_linked(name, &linked, overrides)
+        Self::from_sources(name, overrides, &Sources::BuiltIn)
+    }
+
+    /// The same from other sources.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Kernel`] with file and line where they are known.
+    pub fn from_sources(name: &'static str, overrides: &Overrides, sources: &Sources) -> Result<Self, Error> {
+        Self::from_linked(name, &link(name, sources)?, overrides)
+    }
+
+    /// What the kernel says of itself at the top of its file, without comment signs.
+    pub(crate) fn header(&self) -> impl Iterator<Item = &str> {
+        let lines = self.linked.text.lines().map_while(|line| line.strip_prefix("//"));
+        lines.map(|line| line.strip_prefix(' ').unwrap_or(line))
     }
 
     /// A kernel of a test, from one text.

@@ -75,6 +75,7 @@ fn single_shaders_are_printed() {
     fails(&["--list", "--single-file"], 1, &["spirv has no preprocessor", "expected hlsl"]);
     fails(&["--list", "--target", "cg"], 2, &["cg", "hlsl, spirv"]);
     fails(&[], 2, &["--out"]);
+    fails(&["--list", "--kernels", "nowhere"], 1, &["kernel `classify`", "nowhere/classify.wgsl"]);
 }
 
 #[test]
@@ -82,7 +83,18 @@ fn watching_writes_again_and_survives_mistakes() {
     let folder = Folder::new("watch");
     let (settings, out) = (folder.join("settings.toml"), folder.join("out"));
     fs::write(&settings, "[coverage]\nfallback = 'black'\n").unwrap();
-    let arguments = ["export", "--watch", "--target", "wgsl", "--settings", text(&settings), "--out", text(&out)];
+    let kernels = folder.join("kernels");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../kernels");
+    fs::create_dir_all(kernels.join("shared")).unwrap();
+    for part in ["", "shared"] {
+        for file in
+            fs::read_dir(source.join(part)).unwrap().map(|file| file.unwrap().path()).filter(|path| path.is_file())
+        {
+            fs::copy(&file, kernels.join(part).join(file.file_name().unwrap())).unwrap();
+        }
+    }
+    let arguments = ["export", "--watch", "--target", "wgsl", "--settings", text(&settings)];
+    let arguments = [&arguments[..], &["--kernels", text(&kernels), "--out", text(&out)]].concat();
     let mut child = Command::new(env!("CARGO_BIN_EXE_limpid")).args(arguments).spawn().unwrap();
     let shader = out.join("wgsl/fill.wgsl");
     let wait_for = |wanted: &str| {
@@ -99,6 +111,10 @@ fn watching_writes_again_and_survives_mistakes() {
     std::thread::sleep(std::time::Duration::from_millis(700));
     fs::write(&settings, "[coverage]\nfallback = 'input'\n").unwrap();
     wait_for("textureLoad(in_radiance");
+    let kernel = kernels.join("shared/tiles.wgsl");
+    let edited = fs::read_to_string(&kernel).unwrap().replace("// Position inside an", "// The position inside an");
+    fs::write(&kernel, edited).unwrap();
+    wait_for("// The position inside an 8x8 tile");
     child.kill().unwrap();
     child.wait().unwrap();
 }

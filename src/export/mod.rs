@@ -28,7 +28,7 @@ use sha2::{Digest, Sha256};
 pub use manifest::*;
 
 use crate::emit::{GlslOptions, HlslOptions, MslOptions, Note, SpirvOptions, WgslOptions};
-use crate::kernel::Kernel;
+use crate::kernel::{Kernel, Sources};
 use crate::plan::Pass;
 use crate::resource::{Copy, Kind};
 use crate::{Error, Plan, Settings};
@@ -160,7 +160,16 @@ pub fn settings_hash(settings: &Settings) -> String {
 ///
 /// [`Error::Setting`]; [`Error::Export`] for options that do not go together.
 pub fn bundle(settings: &Settings, options: &Options) -> Result<Vec<File>, Error> {
-    let export = Export::new(settings, options)?;
+    bundle_from(settings, options, &Sources::BuiltIn)
+}
+
+/// The same with kernels from other sources.
+///
+/// # Errors
+///
+/// As [`bundle`]; [`Error::Kernel`] with file and line for mistakes in the sources.
+pub fn bundle_from(settings: &Settings, options: &Options, sources: &Sources) -> Result<Vec<File>, Error> {
+    let export = Export::new(settings, options, sources)?;
     let mut files = Vec::new();
     for &target in Target::ALL.iter().filter(|target| options.targets.contains(target)) {
         files.extend(export.shaders(target)?);
@@ -179,7 +188,7 @@ pub fn bundle(settings: &Settings, options: &Options) -> Result<Vec<File>, Error
 }
 
 impl<'a> Export<'a> {
-    fn new(settings: &'a Settings, options: &'a Options) -> Result<Self, Error> {
+    fn new(settings: &'a Settings, options: &'a Options, sources: &Sources) -> Result<Self, Error> {
         let unfit = options.targets.iter().find(|target| matches!(target, Target::Spirv | Target::Wgsl));
         if let (true, Some(target)) = (options.single_file, unfit) {
             let report =
@@ -187,7 +196,7 @@ impl<'a> Export<'a> {
             return Err(Error::Export { option: "single file", report });
         }
         // The size is only for totals, which the manifest gives as expressions.
-        let (plan, kernels) = Plan::new(settings, UVec2::new(1920, 1080))?;
+        let (plan, kernels) = Plan::from_sources(settings, UVec2::new(1920, 1080), sources)?;
         Ok(Self { settings, options, plan, kernels, settings_hash: settings_hash(settings) })
     }
 

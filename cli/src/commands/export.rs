@@ -10,7 +10,8 @@ use limpid::Settings;
 use limpid::emit::{
     Checks, GlslDialect, GlslOptions, HlslOptions, MslOptions, ShaderModel, SpirvOptions, SpirvVersion, WgslOptions,
 };
-use limpid::export::{File, Options, Target, bundle, manifest_schema};
+use limpid::export::{File, Options, Target, bundle_from, manifest_schema};
+use limpid::kernel::Sources;
 
 use super::settings::SettingsOptions;
 use crate::export;
@@ -35,7 +36,10 @@ pub(super) struct Export {
     /// Write nothing; fail if the folder is not what would be written.
     #[arg(long, requires = "out", conflicts_with_all = ["force", "watch"])]
     check: bool,
-    /// Write again whenever the settings file changes.
+    /// Kernels to use in the place of those built in: a folder such as kernels/.
+    #[arg(long, value_name = "DIR")]
+    kernels: Option<PathBuf>,
+    /// Write again whenever the settings file or one of --kernels changes.
     #[arg(long, requires = "out", conflicts_with_all = ["list", "stdout"])]
     watch: bool,
     /// Write nothing; list the files with their sizes.
@@ -187,10 +191,17 @@ impl LanguageOptions {
     }
 }
 
-/// When a file was changed last.
+/// When a file, or one of those in a folder, was changed last.
 fn modified(path: &Path) -> Result<SystemTime> {
-    let time = std::fs::metadata(path).and_then(|metadata| metadata.modified());
-    time.with_context(|| format!("cannot watch {}", path.display()))
+    let fail = || format!("cannot watch {}", path.display());
+    let metadata = std::fs::metadata(path).with_context(fail)?;
+    let mut latest = metadata.modified().with_context(fail)?;
+    if metadata.is_dir() {
+        for entry in std::fs::read_dir(path).with_context(fail)? {
+            latest = latest.max(modified(&entry.with_context(fail)?.path())?);
+        }
+    }
+    Ok(latest)
 }
 
 impl Export {
@@ -202,7 +213,8 @@ impl Export {
     }
 
     fn files(&self, settings: &Settings) -> Result<Vec<File>> {
-        Ok(bundle(settings, &self.languages.options(self.targets(), self.single_file))?)
+        let sources = self.kernels.clone().map_or(Sources::BuiltIn, Sources::Folder);
+        Ok(bundle_from(settings, &self.languages.options(self.targets(), self.single_file), &sources)?)
     }
 
     pub(super) fn run(&self) -> Result<()> {
@@ -247,15 +259,22 @@ impl Export {
         }
     }
 
-    /// Writes again when the settings file changes; what is wrong with it is printed, and the last export stays.
+    /// Writes again when what it is made from changes; what is wrong with it is printed, and the last export stays.
     fn watch(&self, out: &Path) -> Result<()> {
-        let path = self.settings.file().context("--watch needs a --settings FILE to watch")?;
-        let mut last = modified(path)?;
-        eprintln!("watching {}", path.display());
+        let watched: Vec<_> = self.settings.file().into_iter().chain(self.kernels.as_deref()).collect();
+        let latest = || watched.iter().map(|path| modified(path)).collect::<Result<Vec<_>>>();
+        if watched.is_empty() {
+            bail!("--watch needs something to watch: --settings FILE or --kernels DIR");
+        }
+        let mut last = latest()?;
+        eprintln!(
+            "watching {}",
+            watched.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(" and ")
+        );
         loop {
             std::thread::sleep(Duration::from_millis(300));
             // Editors replace files: for a moment there may be none.
-            let now = modified(path).unwrap_or(last);
+            let now = latest().unwrap_or_else(|_| last.clone());
             if now == last {
                 continue;
             }

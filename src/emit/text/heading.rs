@@ -16,7 +16,7 @@ pub(crate) struct Note {
 impl Writer<'_> {
     /// What the kernel says of itself, where its resources are bound, and what made the file.
     pub(super) fn heading(&self, note: &Note) -> String {
-        let mut lines = crate::kernel::header(self.kernel.name);
+        let mut lines: Vec<_> = self.kernel.header().map(str::to_owned).collect();
         lines.push(String::new());
         let [x, y, z] = self.kernel.workgroup_size;
         lines.push(format!(
