@@ -14,6 +14,7 @@
 //! ```
 
 mod c_header;
+mod describe;
 mod formats;
 mod hlsl_header;
 mod integration;
