@@ -55,6 +55,14 @@ pub enum Error {
     /// The passes after ray tracing were asked for before those in front of it.
     #[error("the denoise stage was asked for, but no frame was classified since the last one")]
     Order,
+    /// Options of an export do not go together.
+    #[error("cannot export: {option}: {report}")]
+    Export {
+        /// Which option.
+        option: &'static str,
+        /// What was found and what was expected.
+        report: String,
+    },
     /// A kernel failed to parse, validate or specialise. This is a defect of limpid, not of the caller.
     #[error("kernel `{kernel}` failed to {stage}: {report}")]
     Kernel {

@@ -1,6 +1,8 @@
 //! Kernels: WGSL sources, linked, specialised and reflected. No graphics API is involved.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::PathBuf;
 
 use naga::back::pipeline_constants::process_overrides;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
@@ -35,8 +37,30 @@ const SOURCES: &[(&str, &str)] = sources![
 /// Values of a kernel's `override` constants.
 pub type Overrides = BTreeMap<String, f64>;
 
-fn source(path: &str) -> Option<&'static str> {
-    SOURCES.iter().find(|(name, _)| *name == path).map(|(_, text)| *text)
+/// Where the texts of kernels come from.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Sources {
+    /// Those that this crate was built with.
+    #[default]
+    BuiltIn,
+    /// Files in a folder laid out as `kernels/`, for those who edit them.
+    Folder(PathBuf),
+}
+
+impl Sources {
+    fn read(&self, path: &str) -> Result<Cow<'static, str>, String> {
+        match self {
+            Self::BuiltIn => {
+                let found = SOURCES.iter().find(|(name, _)| *name == path);
+                found.map(|(_, text)| Cow::Borrowed(*text)).ok_or_else(|| format!("there is no kernels/{path}.wgsl"))
+            }
+            Self::Folder(folder) => {
+                let file = folder.join(format!("{path}.wgsl"));
+                let text = std::fs::read_to_string(&file);
+                text.map(Cow::Owned).map_err(|error| format!("cannot read {}: {error}", file.display()))
+            }
+        }
+    }
 }
 
 /// Names of all kernels.
@@ -69,14 +93,14 @@ impl Linked {
     }
 }
 
-fn splice(path: &str, linked: &mut Linked, seen: &mut HashSet<String>) -> Result<(), String> {
+fn splice(path: &str, sources: &Sources, linked: &mut Linked, seen: &mut HashSet<String>) -> Result<(), String> {
     if !seen.insert(path.to_owned()) {
         return Ok(());
     }
-    let text = source(path).ok_or_else(|| format!("there is no kernels/{path}.wgsl"))?;
+    let text = sources.read(path)?;
     for (index, line) in text.lines().enumerate() {
         if let Some(import) = line.strip_prefix("import package::") {
-            splice(&import.trim_end_matches(';').replace("::", "/"), linked, seen)?;
+            splice(&import.trim_end_matches(';').replace("::", "/"), sources, linked, seen)?;
             continue;
         }
         // Headers are documentation comments of the file, which WGSL has no notion of.
@@ -92,9 +116,9 @@ fn splice(path: &str, linked: &mut Linked, seen: &mut HashSet<String>) -> Result
 /// # Errors
 ///
 /// [`Error::Kernel`] for a name that does not exist or an import that leads nowhere.
-pub fn link(kernel: &'static str) -> Result<Linked, Error> {
+pub fn link(kernel: &'static str, sources: &Sources) -> Result<Linked, Error> {
     let mut linked = Linked { text: String::new(), origins: Vec::new() };
-    splice(kernel, &mut linked, &mut HashSet::new()).map_err(|report| Error::Kernel {
+    splice(kernel, sources, &mut linked, &mut HashSet::new()).map_err(|report| Error::Kernel {
         kernel,
         stage: "link",
         report,
@@ -153,6 +177,8 @@ pub struct Kernel {
     pub info: ModuleInfo,
     /// Its resources, by group and number.
     pub bindings: Vec<Binding>,
+    /// The resources that its source declares, whether specialising kept them or not.
+    pub all_bindings: Vec<Binding>,
     /// Invocations per workgroup.
     pub workgroup_size: [u32; 3],
     /// The source that the spans in `module` are about.
@@ -173,8 +199,29 @@ impl Kernel {
     ///
     /// [`Error::Kernel`] with file and line where they are known.
     pub fn new(name: &'static str, overrides: &Overrides) -> Result<Self, Error> {
-        let linked = link(name)?;
-        Self::from_linked(name, &linked, overrides)
+        Self::from_sources(name, overrides, &Sources::BuiltIn)
+    }
+
+    /// The same from other sources.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Kernel`] with file and line where they are known.
+    pub fn from_sources(name: &'static str, overrides: &Overrides, sources: &Sources) -> Result<Self, Error> {
+        Self::from_linked(name, &link(name, sources)?, overrides)
+    }
+
+    /// What the kernel says of itself at the top of its file, without comment signs.
+    pub(crate) fn header(&self) -> impl Iterator<Item = &str> {
+        let lines = self.linked.text.lines().map_while(|line| line.strip_prefix("//"));
+        lines.map(|line| line.strip_prefix(' ').unwrap_or(line))
+    }
+
+    /// A kernel of a test, from one text.
+    #[cfg(test)]
+    pub(crate) fn from_text(name: &'static str, text: &str) -> Result<Self, Error> {
+        let origins = (1..=text.lines().count()).map(|line| ("test.wgsl".to_owned(), line as u32)).collect();
+        Self::from_linked(name, &Linked { text: text.to_owned(), origins }, &Overrides::new())
     }
 
     fn from_linked(name: &'static str, linked: &Linked, overrides: &Overrides) -> Result<Self, Error> {
@@ -197,10 +244,11 @@ impl Kernel {
             .validate(&module)
             .map_err(|e| fail("validate after specialising", DisplayChain(e.as_inner()).to_string()))?;
         let bindings = reflect(&module).map_err(|report| fail("reflect", report))?;
+        let all_bindings = reflect(&parsed).map_err(|report| fail("reflect", report))?;
         let entry_point =
             module.entry_points.first().ok_or_else(|| fail("reflect", format!("there is no entry point `{name}`")))?;
         let workgroup_size = entry_point.workgroup_size;
-        Ok(Self { name, module, info, bindings, workgroup_size, linked: linked.clone() })
+        Ok(Self { name, module, info, bindings, all_bindings, workgroup_size, linked: linked.clone() })
     }
 }
 
@@ -222,11 +270,12 @@ impl std::fmt::Display for DisplayChain<'_> {
 /// Puts the taken side of every `if` on a constant in its place. naga keeps both, and with the dead one every
 /// resource that it mentions.
 fn remove_dead_branches(module: &mut naga::Module) {
+    let flags = constant_flags(module);
     let functions = module.functions.iter_mut().map(|(_, function)| function);
     let entry_points = module.entry_points.iter_mut().map(|entry_point| &mut entry_point.function);
     for function in functions.chain(entry_points) {
         let body = std::mem::take(&mut function.body);
-        function.body = live_block(body, &function.expressions);
+        function.body = live_block(body, &Known { expressions: &function.expressions, flags: &flags });
         // A name keeps its expression alive: only those that are still evaluated may.
         let mut evaluated = HashSet::new();
         collect_evaluated(&function.body, &mut evaluated);
@@ -234,35 +283,53 @@ fn remove_dead_branches(module: &mut naga::Module) {
     }
 }
 
-fn constant_condition(condition: Handle<Expression>, expressions: &naga::Arena<Expression>) -> Option<bool> {
-    match expressions[condition] {
+/// Module-scope constants, overrides that were given a value among them, that are true or false.
+fn constant_flags(module: &naga::Module) -> HashMap<Handle<naga::Constant>, bool> {
+    let flag = |constant: &naga::Constant| match module.global_expressions[constant.init] {
         Expression::Literal(Literal::Bool(value)) => Some(value),
         _ => None,
+    };
+    module.constants.iter().filter_map(|(handle, constant)| Some((handle, flag(constant)?))).collect()
+}
+
+/// Expressions of a function and the constants that they may name.
+struct Known<'a> {
+    expressions: &'a naga::Arena<Expression>,
+    flags: &'a HashMap<Handle<naga::Constant>, bool>,
+}
+
+impl Known<'_> {
+    fn condition(&self, condition: Handle<Expression>) -> Option<bool> {
+        match self.expressions[condition] {
+            Expression::Literal(Literal::Bool(value)) => Some(value),
+            Expression::Constant(constant) => self.flags.get(&constant).copied(),
+            _ => None,
+        }
     }
 }
 
-fn live_block(block: naga::Block, expressions: &naga::Arena<Expression>) -> naga::Block {
+fn live_block(block: naga::Block, known: &Known) -> naga::Block {
     let mut live = naga::Block::new();
     for (statement, span) in block.span_into_iter() {
         match statement {
-            Statement::If { condition, accept, reject } => match constant_condition(condition, expressions) {
-                Some(taken) => live.extend_block(live_block(if taken { accept } else { reject }, expressions)),
+            Statement::If { condition, accept, reject } => match known.condition(condition) {
+                Some(taken) => live.extend_block(live_block(if taken { accept } else { reject }, known)),
                 None => {
-                    let accept = live_block(accept, expressions);
-                    let reject = live_block(reject, expressions);
+                    let accept = live_block(accept, known);
+                    let reject = live_block(reject, known);
                     live.push(Statement::If { condition, accept, reject }, span);
                 }
             },
-            Statement::Block(inner) => live.push(Statement::Block(live_block(inner, expressions)), span),
+            Statement::Block(inner) => live.push(Statement::Block(live_block(inner, known)), span),
             Statement::Loop { body, continuing, break_if } => {
-                let body = live_block(body, expressions);
-                let continuing = live_block(continuing, expressions);
+                let body = live_block(body, known);
+                let continuing = live_block(continuing, known);
                 live.push(Statement::Loop { body, continuing, break_if }, span);
             }
             Statement::Switch { selector, cases } => {
                 let cases = cases
                     .into_iter()
-                    .map(|case| naga::SwitchCase { body: live_block(case.body, expressions), ..case })
+                    .map(|case| naga::SwitchCase { body: live_block(case.body, known), ..case })
                     .collect();
                 live.push(Statement::Switch { selector, cases }, span);
             }

@@ -58,6 +58,8 @@
 mod denoiser;
 pub mod emit;
 mod error;
+#[cfg(feature = "export")]
+pub mod export;
 mod frame;
 pub mod kernel;
 pub mod memory;

@@ -10,6 +10,7 @@ use crate::resource::{Lifetime, Resource};
 
 /// Memory that limpid allocates, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
 pub struct Memory {
     /// Kept from frame to frame.
     pub persistent: u64,

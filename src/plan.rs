@@ -7,12 +7,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::frame::check_allocation;
-use crate::kernel::{Kernel, Overrides};
+use crate::kernel::{Kernel, Overrides, Sources};
 use crate::resource::{Access, Copy, Count, Extent, Format, Kind, Lifetime, Resource};
 use crate::settings::{Channel, Fallback, NormalEncoding, RaysPerQuad, RoughnessEncoding, Settings};
 
 /// When in the frame a pass runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Stage {
     /// Before the renderer traces its rays.
@@ -285,10 +286,10 @@ fn override_value(settings: &Settings, name: &str) -> f64 {
     }
 }
 
-fn plan_pass(template: &PassTemplate, settings: &Settings) -> Result<(Pass, Kernel), Error> {
+fn plan_pass(template: &PassTemplate, settings: &Settings, sources: &Sources) -> Result<(Pass, Kernel), Error> {
     let overrides: Overrides =
         template.overrides.iter().map(|&name| (name.to_owned(), override_value(settings, name))).collect();
-    let kernel = Kernel::new(template.kernel, &overrides)?;
+    let kernel = Kernel::from_sources(template.kernel, &overrides, sources)?;
     let mut bindings = Vec::new();
     for binding in &kernel.bindings {
         let (resource, copy) = template
@@ -329,13 +330,22 @@ impl Plan {
     ///
     /// [`Error::Setting`] and [`Error::Size`]; [`Error::Kernel`] would be a defect of limpid.
     pub fn new(settings: &Settings, size: UVec2) -> Result<(Self, Vec<Kernel>), Error> {
+        Self::from_sources(settings, size, &Sources::BuiltIn)
+    }
+
+    /// The same with kernels from other sources.
+    ///
+    /// # Errors
+    ///
+    /// As [`Plan::new`]; [`Error::Kernel`] with file and line for mistakes in the sources.
+    pub fn from_sources(settings: &Settings, size: UVec2, sources: &Sources) -> Result<(Self, Vec<Kernel>), Error> {
         settings.validate()?;
         check_allocation(size)?;
         let mut passes = Vec::new();
         let mut kernels = Vec::new();
         let is_needed = |template: &&PassTemplate| template.kernel != "prefilter" || settings.features.spatial_filter;
         for template in PASSES.iter().filter(is_needed) {
-            let (pass, kernel) = plan_pass(template, settings)?;
+            let (pass, kernel) = plan_pass(template, settings, sources)?;
             passes.push(pass);
             kernels.push(kernel);
         }

@@ -8,6 +8,7 @@ pub const TILE_SIZE: u32 = 8;
 
 /// How a pass uses a resource.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Access {
     /// Reads only.
@@ -27,6 +28,7 @@ impl Access {
 
 /// Texel formats that limpid stores. WebGPU can write all of them without optional features.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
     /// Four half floats.
@@ -54,6 +56,7 @@ impl Format {
 
 /// Size of a texture relative to the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Extent {
     /// One texel a pixel.
@@ -123,6 +126,7 @@ pub enum Kind {
 
 /// How long content lives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Lifetime {
     /// The caller's.
@@ -162,6 +166,7 @@ impl Resource {
 
 /// Which copy of a resource.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Copy {
     /// This frame's, or the only one.

@@ -8,6 +8,7 @@ use crate::resource::{Access, Copy, Lifetime, Resource};
 
 /// How a resource is used at some point of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Usage {
     /// By a kernel.
@@ -41,6 +42,7 @@ pub struct Dependency {
 
 /// A set of ways in which passes use memory: one side of a [`Barrier`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
 pub struct Scope {
     /// Kernels that read.
     pub kernel_reads: bool,
@@ -71,6 +73,7 @@ impl Scope {
 
 /// A barrier on all memory: what was recorded before it and is in scope `before` comes first.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
 pub struct Barrier {
     /// What has to be finished, its writes visible.
     pub before: Scope,

@@ -7,42 +7,15 @@ use limpid::emit::{Checks, SpirvOptions, SpirvVersion};
 use limpid::kernel::{BindingKind, Kernel, Overrides, names};
 use limpid::plan::{Grid, Stage};
 use limpid::resource::{Access, Kind};
-use limpid::settings::{Channel, Fallback, NormalEncoding, RayList, RaysPerQuad, RoughnessEncoding};
+use limpid::settings::{Fallback, RayList};
 use limpid::synchronization::Usage;
 use limpid::{Camera, Denoiser, Error, FrameInputs, Plan, Preset, Settings};
-use limpid_harness::strategy::any_features;
 use proptest::prelude::*;
 
-const SIZE: UVec2 = UVec2::new(1920, 1080);
+mod any_settings;
+use any_settings::any_settings;
 
-fn any_settings() -> impl Strategy<Value = Settings> {
-    use NormalEncoding::{Octahedral, OctahedralUnsigned, Signed, Unsigned};
-    let rays = prop::sample::select(vec![RaysPerQuad::One, RaysPerQuad::Two, RaysPerQuad::Four]);
-    let ray_list = prop::option::of((rays, prop::option::of(0.0f32..=1.0)));
-    (
-        prop::sample::select(vec![Signed, Unsigned, Octahedral, OctahedralUnsigned]),
-        prop::sample::select(vec![Channel::Red, Channel::Green, Channel::Blue, Channel::Alpha]),
-        prop::sample::select(vec![RoughnessEncoding::Perceptual, RoughnessEncoding::Alpha]),
-        prop::sample::select(vec![Fallback::Black, Fallback::Input, Fallback::Environment]),
-        ray_list,
-        any_features(),
-    )
-        .prop_map(|(normal, channel, roughness, fallback, ray_list, features)| {
-            let mut settings = Settings::default();
-            settings.features = features;
-            settings.conventions.normal = normal;
-            settings.conventions.roughness_channel = channel;
-            settings.conventions.roughness = roughness;
-            settings.coverage.fallback = fallback;
-            settings.coverage.ray_list = ray_list.map(|(rays_per_quad, variance_threshold)| {
-                let mut list = RayList::default();
-                list.rays_per_quad = rays_per_quad;
-                list.variance_threshold = variance_threshold;
-                list
-            });
-            settings
-        })
-}
+const SIZE: UVec2 = UVec2::new(1920, 1080);
 
 /// Reflection written again from naga's module, not through limpid's own.
 fn reflected(kernel: &Kernel) -> HashMap<String, (u32, u32, bool)> {

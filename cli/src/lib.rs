@@ -6,6 +6,7 @@
 pub mod analyze;
 pub mod backend;
 pub mod commands;
+pub mod export;
 pub mod metrics;
 pub mod picture;
 pub mod scene;

@@ -1,26 +1,34 @@
 use naga::back::spv::{self, WriterFlags, ZeroInitializeWorkgroupMemoryMode};
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
+use serde::{Deserialize, Serialize};
 
 use super::Checks;
 use crate::Error;
 use crate::kernel::Kernel;
 
 /// Version of SPIR-V. Vulkan 1.0 accepts 1.0, Vulkan 1.1 up to 1.3.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
 pub enum SpirvVersion {
     /// 1.0
+    #[serde(rename = "1.0")]
     V1_0,
     /// 1.1
+    #[serde(rename = "1.1")]
     V1_1,
     /// 1.2
+    #[serde(rename = "1.2")]
     V1_2,
     /// 1.3
+    #[serde(rename = "1.3")]
     #[default]
     V1_3,
 }
 
 /// How to write SPIR-V.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
+#[serde(default, deny_unknown_fields)]
 pub struct SpirvOptions {
     /// Version.
     pub version: SpirvVersion,
@@ -28,11 +36,15 @@ pub struct SpirvOptions {
     pub debug_names: bool,
     /// What is checked while the kernel runs.
     pub checks: Checks,
+    /// Descriptor set of group 0; that of group 1 follows.
+    pub first_set: u32,
+    /// Number of the first binding of each set.
+    pub first_binding: u32,
 }
 
 impl Kernel {
     /// The kernel as SPIR-V for Vulkan. The entry point has the kernel's name; group and number of each binding
-    /// are its descriptor set and binding.
+    /// are its descriptor set and binding, counted from the options' first ones.
     ///
     /// # Errors
     ///
@@ -57,9 +69,16 @@ impl Kernel {
             emit_int_div_checks: is_robust,
             ..spv::Options::default()
         };
+        let mut module = self.module.clone();
+        for (_, variable) in module.global_variables.iter_mut() {
+            if let Some(at) = &mut variable.binding {
+                at.group += options.first_set;
+                at.binding += options.first_binding;
+            }
+        }
         let pipeline =
             spv::PipelineOptions { shader_stage: naga::ShaderStage::Compute, entry_point: self.name.to_owned() };
-        spv::write_vec(&self.module, &self.info, &naga_options, Some(&pipeline)).map_err(|error| Error::Kernel {
+        spv::write_vec(&module, &self.info, &naga_options, Some(&pipeline)).map_err(|error| Error::Kernel {
             kernel: self.name,
             stage: "write SPIR-V",
             report: error.to_string(),

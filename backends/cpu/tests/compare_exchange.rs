@@ -88,7 +88,7 @@ fn a_loop_of_exchanges_adds_floats_of_all_invocations() {
         }";
     let sums = Buffer::new(bits(&[0.0; 4]));
     dispatch(&executor(source), [50, 1, 1], &[Binding::buffer(0, 0, &sums)], source);
-    let sum = |rest: u32| (0..5000u32).filter(|i| i % 4 == rest).map(|i| (i % 7) as f32).sum();
+    let sum = |rest: u32| (0..5000u32).filter(|i| i % 4 == rest).map(|i| (i % 7) as f32).sum::<f32>();
     assert_eq!(floats(&sums.read()), [0, 1, 2, 3].map(sum));
 }
 

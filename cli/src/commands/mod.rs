@@ -3,6 +3,7 @@
 mod analyze;
 mod demo;
 mod denoise;
+mod export;
 mod plan;
 mod report;
 mod settings;
@@ -29,6 +30,8 @@ enum Command {
     Denoise(denoise::Denoise),
     /// Looks at a sequence's data and says what is wrong with it.
     Analyze(analyze::Analyze),
+    /// Writes shaders, tables and documents for engines that do not link Rust.
+    Export(Box<export::Export>),
     /// Prints what is allocated and dispatched for some settings and size.
     Plan(plan::PlanCommand),
 }
@@ -44,6 +47,7 @@ impl Cli {
             Command::Demo(demo) => demo.run(),
             Command::Denoise(denoise) => denoise.run(),
             Command::Analyze(analyze) => analyze.run(),
+            Command::Export(export) => export.run(),
             Command::Plan(plan) => plan.run(),
         }
     }

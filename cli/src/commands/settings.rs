@@ -61,6 +61,11 @@ fn parse_set(option: &str) -> Result<Table> {
 }
 
 impl SettingsOptions {
+    /// The settings file that was given.
+    pub(crate) fn file(&self) -> Option<&Path> {
+        self.settings.as_deref()
+    }
+
     pub(crate) fn load(&self) -> Result<Settings> {
         let preset = Preset::ALL.iter().find(|(name, _)| *name == self.preset);
         let (_, preset) = preset.with_context(|| format!("there is no preset `{}`", self.preset))?;
