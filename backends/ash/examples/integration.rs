@@ -38,7 +38,9 @@ unsafe fn run() -> Result<(), Box<dyn Error>> {
         let has_compute = |family: &vk::QueueFamilyProperties| family.queue_flags.contains(vk::QueueFlags::COMPUTE);
         let queue_family = families.iter().position(has_compute).ok_or("no compute queue")? as u32;
         let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];
-        let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues);
+        // The one feature that limpid needs: it stores two 32-bit integers a texel.
+        let features = vk::PhysicalDeviceFeatures::default().shader_storage_image_extended_formats(true);
+        let info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&features);
         let device = instance.create_device(physical_device, &info, None)?;
         let queue = device.get_device_queue(queue_family, 0);
         let allocator = Arc::new(Mutex::new(Allocator::new(&AllocatorCreateDesc {

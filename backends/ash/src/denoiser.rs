@@ -106,7 +106,7 @@ impl Denoiser {
     /// # Safety
     ///
     /// The handles of `gpu` and `options` belong together and stay valid until the denoiser is dropped. The
-    /// extensions and features that `options` names are enabled.
+    /// extensions and features that `options` names are enabled, and `shaderStorageImageExtendedFormats`.
     ///
     /// # Errors
     ///

@@ -14,7 +14,8 @@ pub struct Gpu<'a> {
     pub instance: &'a ash::Instance,
     /// The physical device that `device` was made from.
     pub physical_device: vk::PhysicalDevice,
-    /// The device, of Vulkan 1.1 or later. No extension and no optional feature is needed.
+    /// The device, of Vulkan 1.1 or later, with the feature `shaderStorageImageExtendedFormats` enabled, which every
+    /// desktop GPU has: limpid stores `R32G32_UINT`. No extension is needed.
     pub device: &'a ash::Device,
     /// Family of the queue that frames are submitted to: with compute, graphics or not.
     pub queue_family: u32,
@@ -50,16 +51,20 @@ impl Shared {
         debug_utils: Option<ash::ext::debug_utils::Device>,
     ) -> Result<Self, Error> {
         // SAFETY: the caller of `Denoiser::new` vouches for the handles of `gpu`.
-        let (properties, families) = unsafe {
-            let instance = gpu.instance;
-            let families = instance.get_physical_device_queue_family_properties(gpu.physical_device);
-            (instance.get_physical_device_properties(gpu.physical_device), families)
+        let (properties, features, families) = unsafe {
+            let (instance, device) = (gpu.instance, gpu.physical_device);
+            let families = instance.get_physical_device_queue_family_properties(device);
+            let features = instance.get_physical_device_features(device);
+            (instance.get_physical_device_properties(device), features, families)
         };
         let unsupported = |what: String| Err(Error::Unsupported { what });
         let version = properties.api_version;
         if version < vk::API_VERSION_1_1 {
             let (major, minor) = (vk::api_version_major(version), vk::api_version_minor(version));
             return unsupported(format!("Vulkan 1.1, it has {major}.{minor}"));
+        }
+        if features.shader_storage_image_extended_formats == vk::FALSE {
+            return unsupported("the feature shaderStorageImageExtendedFormats".to_owned());
         }
         let Some(family) = families.get(gpu.queue_family as usize) else {
             return unsupported(format!("queue family {}, it has {}", gpu.queue_family, families.len()));

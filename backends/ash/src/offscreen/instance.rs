@@ -139,8 +139,9 @@ pub(super) fn open_device(
     unsafe { instance.get_physical_device_features2(physical_device, &mut available) };
     let basic = available.features;
     let has_synchronization2 = is_1_3 && available13.synchronization2 == vk::TRUE;
-    // What GPU-assisted validation writes its findings with.
+    // limpid's own, and what GPU-assisted validation writes its findings with.
     let features = vk::PhysicalDeviceFeatures::default()
+        .shader_storage_image_extended_formats(basic.shader_storage_image_extended_formats == vk::TRUE)
         .fragment_stores_and_atomics(basic.fragment_stores_and_atomics == vk::TRUE)
         .vertex_pipeline_stores_and_atomics(basic.vertex_pipeline_stores_and_atomics == vk::TRUE);
     let mut enabled13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(has_synchronization2);
