@@ -55,6 +55,7 @@ impl Cost {
         self.passes.iter().map(|(_, _, bindings)| bindings).sum()
     }
 
+    /// Whether nothing costs more than elsewhere.
     fn is_within(&self, more: &Self) -> bool {
         self.bytes <= more.bytes
             && self.words() <= more.words()
