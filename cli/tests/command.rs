@@ -67,7 +67,7 @@ fn demo<'a>(out: &'a str, more: &[&'a str]) -> serde_json::Value {
 fn usage_is_explained_and_mistakes_have_code_two() {
     let help = limpid(&["--help"]);
     assert!(help.status.success());
-    for command in ["demo", "denoise", "plan"] {
+    for command in ["demo", "denoise", "bench", "plan"] {
         assert!(text(&help.stdout).contains(command));
         assert!(limpid(&[command, "--help"]).status.success());
     }

@@ -76,6 +76,21 @@ pub enum Choice {
     Cpu,
 }
 
+/// What automatic choice comes to on this machine, said on standard error where that is the CPU; other choices as
+/// they are.
+pub fn settle(choice: Choice) -> Choice {
+    if choice != Choice::Auto {
+        return choice;
+    }
+    match gpu::Gpu::open(&Settings::default(), UVec2::ONE) {
+        Ok(_) => Choice::Wgpu,
+        Err(error) => {
+            eprintln!("note: running on the CPU, because {error:#}");
+            Choice::Cpu
+        }
+    }
+}
+
 /// Opens a backend for images of up to `size` pixels.
 ///
 /// # Errors

@@ -1,7 +1,9 @@
 //! The subcommands.
 
+mod bench;
 mod demo;
 mod denoise;
+mod interrupt;
 mod plan;
 mod report;
 mod settings;
@@ -26,6 +28,8 @@ enum Command {
     Demo(demo::Demo),
     /// Denoises a sequence of EXR frames.
     Denoise(denoise::Denoise),
+    /// Measures error against run time, over presets, settings and features, and writes a report.
+    Bench(Box<bench::Bench>),
     /// Prints what is allocated and dispatched for some settings and size.
     Plan(plan::PlanCommand),
 }
@@ -40,6 +44,7 @@ impl Cli {
         match self.command {
             Command::Demo(demo) => demo.run(),
             Command::Denoise(denoise) => denoise.run(),
+            Command::Bench(bench) => bench.run(),
             Command::Plan(plan) => plan.run(),
         }
     }

@@ -61,6 +61,10 @@ fn parse_set(option: &str) -> Result<Table> {
 }
 
 impl SettingsOptions {
+    pub(crate) fn new(preset: &str, settings: Option<&Path>, set: &[String]) -> Self {
+        Self { preset: preset.to_owned(), settings: settings.map(Path::to_owned), set: set.to_vec() }
+    }
+
     pub(crate) fn load(&self) -> Result<Settings> {
         let preset = Preset::ALL.iter().find(|(name, _)| *name == self.preset);
         let (_, preset) = preset.with_context(|| format!("there is no preset `{}`", self.preset))?;
