@@ -10,3 +10,4 @@ pub mod metrics;
 pub mod picture;
 pub mod scene;
 pub mod sequence;
+pub mod stability;

@@ -67,7 +67,7 @@ fn demo<'a>(out: &'a str, more: &[&'a str]) -> serde_json::Value {
 fn usage_is_explained_and_mistakes_have_code_two() {
     let help = limpid(&["--help"]);
     assert!(help.status.success());
-    for command in ["demo", "denoise", "bench", "plan"] {
+    for command in ["demo", "denoise", "bench", "stability", "plan"] {
         assert!(text(&help.stdout).contains(command));
         assert!(limpid(&[command, "--help"]).status.success());
     }
@@ -194,4 +194,16 @@ fn bad_sequences_are_refused_and_finished_frames_stay() {
     fs::write(&camera, &good).unwrap();
     assert_eq!(Sequence::open(&noisy, &ChannelNames::default()).unwrap().len(), 4);
     succeeds(&["denoise", sequence, "--out", path(&out), "--force"]);
+}
+
+#[test]
+fn stability_is_judged_case_by_case() {
+    let json = succeeds(&["stability", "--backend", "cpu", "--case", "NaN at one pixel", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let verdicts = report["verdicts"].as_array().unwrap();
+    // Two cases with two presets: finite, bounded, footprint and lifetime.
+    assert_eq!(verdicts.len(), 16);
+    assert!(verdicts.iter().all(|verdict| verdict["passed"] == true), "{json}");
+    fails(&["stability", "--case", "no such case"], 1, &["no such case"]);
+    fails(&["stability", "--long", "3"], 2, &["160 to 1000000"]);
 }

@@ -7,6 +7,7 @@ mod interrupt;
 mod plan;
 mod report;
 mod settings;
+mod stability;
 
 use std::io::Write;
 
@@ -30,6 +31,8 @@ enum Command {
     Denoise(denoise::Denoise),
     /// Measures error against run time, over presets, settings and features, and writes a report.
     Bench(Box<bench::Bench>),
+    /// Tries to break the numbers of every preset on every backend, and judges the results by criteria.
+    Stability(stability::Stability),
     /// Prints what is allocated and dispatched for some settings and size.
     Plan(plan::PlanCommand),
 }
@@ -45,6 +48,7 @@ impl Cli {
             Command::Demo(demo) => demo.run(),
             Command::Denoise(denoise) => denoise.run(),
             Command::Bench(bench) => bench.run(),
+            Command::Stability(stability) => stability.run(),
             Command::Plan(plan) => plan.run(),
         }
     }
