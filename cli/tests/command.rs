@@ -204,6 +204,12 @@ fn stability_is_judged_case_by_case() {
     // Two cases with two presets: finite, bounded, footprint and lifetime.
     assert_eq!(verdicts.len(), 16);
     assert!(verdicts.iter().all(|verdict| verdict["passed"] == true), "{json}");
+    let json = succeeds(&["stability", "--probe", "--case", "infinity at one pixel, soon", "--json"]);
+    let probe: serde_json::Value = serde_json::from_str(&json).unwrap();
+    // Each kernel with its operations, and outputs that are right but for rounding.
+    let worst = probe["resolve_temporal"]["outputs"][0]["relative"].as_f64().unwrap();
+    assert!(worst > 0.0 && worst < 1e-2, "{json}");
+    assert!(probe["reproject"]["operations"].as_u64().unwrap() > 100_000);
     fails(&["stability", "--case", "no such case"], 1, &["no such case"]);
     fails(&["stability", "--long", "3"], 2, &["160 to 1000000"]);
 }

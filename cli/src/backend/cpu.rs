@@ -11,16 +11,27 @@ use limpid_cpu::{Denoiser, Inputs, TexelFormat, Texture};
 use super::{Backend, Denoised, ListedRay, Tracer, split, timed, to_half, trace_listed};
 use crate::sequence::Frame;
 
-pub(super) struct Cpu {
+pub(crate) struct Cpu {
     description: String,
     denoiser: Denoiser,
 }
 
 impl Cpu {
-    pub(super) fn open(settings: &Settings, size: UVec2) -> Result<Self> {
+    pub(crate) fn open(settings: &Settings, size: UVec2) -> Result<Self> {
         let denoiser = Denoiser::new(settings, size)?;
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         Ok(Self { description: format!("the CPU ({threads} threads, no driver)"), denoiser })
+    }
+
+    /// The same, watching what happens to numbers.
+    pub(crate) fn open_probed(settings: &Settings, size: UVec2) -> Result<Self> {
+        let mut cpu = Self::open(settings, size)?;
+        cpu.denoiser.probe();
+        Ok(cpu)
+    }
+
+    pub(crate) fn denoiser(&self) -> &Denoiser {
+        &self.denoiser
     }
 }
 

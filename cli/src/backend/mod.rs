@@ -15,6 +15,7 @@ use limpid::settings::DepthEncoding;
 use limpid::{Plan, Settings};
 
 use crate::sequence::Frame;
+pub(crate) use cpu::Cpu;
 
 /// A denoised frame and what it took.
 #[derive(Debug, Clone)]

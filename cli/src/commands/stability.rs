@@ -7,6 +7,7 @@ use limpid::{Preset, Settings};
 
 use super::interrupt;
 use crate::backend::{self, Choice};
+use crate::stability::probe::ProbeReport;
 use crate::stability::{Case, Report, library, run};
 
 /// Tries to break the numbers of every preset on every backend, and judges the results by criteria.
@@ -24,6 +25,10 @@ pub(super) struct Stability {
     /// Frames of long runs.
     #[arg(long, default_value_t = library::LONG, value_parser = parse_frames)]
     long: usize,
+    /// Look inside of the kernels instead, on the CPU with the default preset: where NaN, infinity, denormal numbers
+    /// and cancellation arise, and the rounding error of what is written, by kernel and line. Long runs are left out.
+    #[arg(long, conflicts_with = "backend")]
+    probe: bool,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -55,17 +60,31 @@ impl Stability {
         self.case.is_empty() || self.case.iter().any(is_in)
     }
 
-    pub(super) fn run(&self) -> Result<()> {
-        let mut backends = self.backend.clone();
-        if backends.is_empty() {
-            backends = available();
+    fn probe(&self, cases: &[Case]) -> Result<()> {
+        let progress = ProgressBar::new(cases.len() as u64);
+        let mut report = ProbeReport::default();
+        for case in cases.iter().filter(|case| case.frames < self.long).take_while(|_| !interrupt::requested()) {
+            report.add(case)?;
+            progress.inc(1);
         }
-        backends.iter_mut().for_each(|choice| *choice = backend::settle(*choice));
+        progress.finish_and_clear();
+        super::print(&if self.json { serde_json::to_string_pretty(&report)? + "\n" } else { report.to_string() })
+    }
+
+    pub(super) fn run(&self) -> Result<()> {
         let cases: Vec<Case> = library::all(self.long).into_iter().filter(|case| self.is_wanted(case)).collect();
         if cases.is_empty() {
             bail!("no case is called like {}", self.case.join(" or "));
         }
         interrupt::listen()?;
+        if self.probe {
+            return self.probe(&cases);
+        }
+        let mut backends = self.backend.clone();
+        if backends.is_empty() {
+            backends = available();
+        }
+        backends.iter_mut().for_each(|choice| *choice = backend::settle(*choice));
         let progress = ProgressBar::new((cases.len() * backends.len() * Preset::ALL.len()) as u64);
         let mut report = Report::default();
         for case in &cases {

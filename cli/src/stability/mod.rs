@@ -8,6 +8,7 @@ mod extremes;
 mod geometry;
 mod known;
 pub mod library;
+pub mod probe;
 mod report;
 pub mod run;
 #[cfg(test)]
