@@ -95,7 +95,11 @@ pub(super) fn sensitivity() -> Vec<Case> {
     const GROUP: &str = "rounding";
     // The next half float, as far as one lies above a value near 1.
     const HALF_STEP: f32 = 1.0 + 1.0 / 1024.0;
-    let case = |name: &str, twin: fn(usize, UVec2) -> Pixel| Case::new(GROUP, name, noisy).lasting(24).against(twin);
+    // The camera moves, so that places in the frame before depend on everything.
+    let moving = |frame: usize| Step::still(UVec2::new(40, 24)).at(Vec3::X * 0.03 * frame as f32);
+    let case = |name: &str, twin: fn(usize, UVec2) -> Pixel| {
+        Case::new(GROUP, name, noisy).lasting(24).against(twin).stepped(moving)
+    };
     let shifted =
         |shift: f32| move |frame: usize, p: UVec2| Pixel { motion: [shift, 0.0], roughness: 0.44, ..noisy(frame, p) };
     vec![
