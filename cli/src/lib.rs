@@ -5,9 +5,11 @@
 
 pub mod analyze;
 pub mod backend;
+pub mod bench;
 pub mod commands;
 pub mod export;
 pub mod metrics;
 pub mod picture;
 pub mod scene;
 pub mod sequence;
+pub mod stability;

@@ -67,7 +67,7 @@ fn demo<'a>(out: &'a str, more: &[&'a str]) -> serde_json::Value {
 fn usage_is_explained_and_mistakes_have_code_two() {
     let help = limpid(&["--help"]);
     assert!(help.status.success());
-    for command in ["demo", "denoise", "analyze", "export", "plan"] {
+    for command in ["demo", "denoise", "analyze", "bench", "export", "stability", "plan"] {
         assert!(text(&help.stdout).contains(command));
         assert!(limpid(&[command, "--help"]).status.success());
     }
@@ -212,4 +212,22 @@ fn data_that_means_something_else_is_recognised() {
     let text = text(&limpid(&wrong).stdout);
     assert!(text.contains("they point the other way") && text.contains("[1, 1]"), "{text}");
     fails(&["analyze", path(&folder.join("nowhere"))], 1, &["camera.json"]);
+}
+
+#[test]
+fn stability_is_judged_case_by_case() {
+    let json = succeeds(&["stability", "--backend", "cpu", "--case", "NaN at one pixel", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let verdicts = report["verdicts"].as_array().unwrap();
+    // Two cases with two presets: finite, bounded, footprint and lifetime.
+    assert_eq!(verdicts.len(), 16);
+    assert!(verdicts.iter().all(|verdict| verdict["passed"] == true), "{json}");
+    let json = succeeds(&["stability", "--probe", "--case", "infinity at one pixel, soon", "--json"]);
+    let probe: serde_json::Value = serde_json::from_str(&json).unwrap();
+    // Each kernel with its operations, and outputs that are right but for rounding.
+    let worst = probe["resolve_temporal"]["outputs"][0]["relative"].as_f64().unwrap();
+    assert!(worst > 0.0 && worst < 1e-2, "{json}");
+    assert!(probe["reproject"]["operations"].as_u64().unwrap() > 100_000);
+    fails(&["stability", "--case", "no such case"], 1, &["no such case"]);
+    fails(&["stability", "--long", "3"], 2, &["160 to 1000000"]);
 }

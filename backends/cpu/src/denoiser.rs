@@ -1,4 +1,4 @@
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::UVec2;
 use limpid::kernel::Kernel;
@@ -6,7 +6,7 @@ use limpid::plan::{Bound, Grid, OUTPUT, Pass, Stage};
 use limpid::resource::{Copy, Format, Kind};
 use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
-use crate::{Binding, Buffer, CompileError, Error, Executor, Fault, TexelFormat, Texture};
+use crate::{Binding, Buffer, CompileError, Error, Executor, Fault, Probe, TexelFormat, Texture};
 
 /// The caller's images of one frame, of any format. Encodings are set in
 /// [`Settings::conventions`](limpid::settings::Conventions).
@@ -65,6 +65,8 @@ pub struct Denoiser {
     constants: Buffer,
     /// Faults by kernel, when kernels are watched.
     faults: Option<Vec<(&'static str, Fault)>>,
+    /// What the probe saw, by kernel, when it is in use.
+    probes: Option<BTreeMap<&'static str, Probe>>,
 }
 
 fn texel_format(format: Format) -> TexelFormat {
@@ -131,7 +133,7 @@ impl Denoiser {
         let executors = core.kernels().iter().map(compile).collect::<Result<_, _>>()?;
         let allocations = allocate(core.plan());
         let constants = Buffer::zeroed(size_of::<FrameConstants>() / 4);
-        Ok(Self { core, executors, allocations, constants, faults: None })
+        Ok(Self { core, executors, allocations, constants, faults: None, probes: None })
     }
 
     /// What is allocated and dispatched.
@@ -159,8 +161,8 @@ impl Denoiser {
     pub fn set_settings(&mut self, settings: &Settings) -> Result<(), Error> {
         let mut core = self.core.clone();
         if core.set_settings(settings)? {
-            let faults = self.faults.take();
-            *self = Self { faults, ..Self::with_core(core)? };
+            let (faults, probes) = (self.faults.take(), self.probes.take());
+            *self = Self { faults, probes, ..Self::with_core(core)? };
         } else {
             self.core = core;
         }
@@ -206,6 +208,7 @@ impl Denoiser {
     fn run_stage(&mut self, stage: Stage, inputs: &Inputs<'_>, schedule: &FrameSchedule) -> Result<(), Error> {
         let passes = self.core.plan().passes.iter().zip(&self.executors).zip(self.core.kernels());
         let mut found = Vec::new();
+        let mut probed = Vec::new();
         for ((pass, executor), kernel) in passes.filter(|((pass, _), _)| pass.stage == stage) {
             let bindings: Vec<_> =
                 pass.bindings.iter().filter_map(|bound| self.binding(bound, inputs, schedule.phase)).collect();
@@ -214,9 +217,14 @@ impl Denoiser {
                 found.extend(
                     executor.dispatch_checked(groups, &bindings)?.into_iter().map(|fault| (kernel.name, fault)),
                 );
+            } else if self.probes.is_some() {
+                probed.push((kernel.name, executor.dispatch_probed(groups, &bindings)?));
             } else {
                 executor.dispatch(groups, &bindings)?;
             }
+        }
+        if let Some(probes) = &mut self.probes {
+            probed.into_iter().for_each(|(kernel, probe)| probes.entry(kernel).or_default().merge(probe));
         }
         if let Some(faults) = &mut self.faults {
             faults.extend(found);
@@ -240,11 +248,24 @@ impl Denoiser {
     /// What kernels did that they must not, since [`watch`](Self::watch): kernel, place in its source as
     /// `file:line`, and fault.
     pub fn faults(&self) -> impl Iterator<Item = (&'static str, String, &Fault)> {
-        self.faults.iter().flatten().map(|(name, fault)| {
-            let kernel = self.core.kernels().iter().find(|kernel| kernel.name == *name);
-            let place = kernel.zip(fault.offset).and_then(|(kernel, offset)| kernel.linked.place(offset));
-            (*name, place.unwrap_or_default(), fault)
-        })
+        self.faults.iter().flatten().map(|(name, fault)| (*name, self.place(name, fault.offset), fault))
+    }
+
+    /// From now on runs kernels one workgroup after another and watches what happens to numbers; see
+    /// [`Executor::dispatch_probed`].
+    pub fn probe(&mut self) {
+        self.probes = Some(BTreeMap::new());
+    }
+
+    /// What the probe saw of each kernel since [`probe`](Self::probe). [`place`](Self::place) tells lines.
+    pub fn probes(&self) -> impl Iterator<Item = (&'static str, &Probe)> {
+        self.probes.iter().flatten().map(|(kernel, probe)| (*kernel, probe))
+    }
+
+    /// Place in a kernel's source as `file:line`; empty where it is not known.
+    pub fn place(&self, kernel: &str, offset: Option<usize>) -> String {
+        let kernel = self.core.kernels().iter().find(|other| other.name == kernel);
+        kernel.zip(offset).and_then(|(kernel, offset)| kernel.linked.place(offset)).unwrap_or_default()
     }
 
     fn workgroups(&self, pass: &Pass, schedule: &FrameSchedule) -> [u32; 3] {

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use crate::compile::{BindingSlot, Code, SlotKind, compile};
 use crate::inexact::Inexact;
 use crate::machine::{Bound, Machine};
-use crate::{Buffer, CompileError, DispatchError, Fault, Sampler, Texture};
+use crate::{Buffer, CompileError, DispatchError, Fault, Probe, Sampler, Texture};
 
 /// A resource for a binding of a kernel.
 #[derive(Debug, Clone, Copy)]
@@ -120,6 +120,20 @@ impl Executor {
         let mut machine = Machine::checked(&self.code, &bound, groups);
         (0..count(groups)).for_each(|index| machine.run(position(groups, index)));
         Ok(machine.into_faults())
+    }
+
+    /// Runs `groups` workgroups one after another and watches what happens to numbers: where NaN, infinity,
+    /// denormal numbers and cancellation arise, and how far outputs are from what 64 bits would give. Results are
+    /// those of [`dispatch`](Self::dispatch).
+    ///
+    /// # Errors
+    ///
+    /// As [`dispatch`](Self::dispatch).
+    pub fn dispatch_probed(&self, groups: [u32; 3], bindings: &[Binding<'_>]) -> Result<Probe, DispatchError> {
+        let bound = self.bind_all(bindings)?;
+        let mut machine = Machine::probed(&self.code, &bound, groups);
+        (0..count(groups)).for_each(|index| machine.run(position(groups, index)));
+        Ok(machine.into_probe())
     }
 
     fn bind_all<'a>(&self, bindings: &[Binding<'a>]) -> Result<Vec<Bound<'a>>, DispatchError> {

@@ -54,6 +54,7 @@ mod layout;
 mod machine;
 mod math;
 mod op;
+mod probe;
 mod registers;
 mod resource;
 mod sampler;
@@ -62,6 +63,7 @@ pub use check::{Fault, FaultKind};
 pub use denoiser::{Denoiser, Inputs};
 pub use error::{CompileError, DispatchError, Error};
 pub use executor::{Binding, Executor};
+pub use probe::{Event, EventKind, OutputError, Probe};
 pub use resource::{Buffer, TexelFormat, Texture};
 pub use sampler::{AddressMode, BorderColor, Compare, Filter, Sampler};
 

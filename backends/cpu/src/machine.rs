@@ -1,6 +1,7 @@
 //! Runs compiled kernels, one workgroup at a time, every instruction for all of its invocations.
 
 mod memory;
+mod probe;
 mod sample;
 mod subgroup;
 mod texture;
@@ -12,6 +13,7 @@ use crate::compile::Code;
 use crate::eval::{f, with_binary, with_unary};
 use crate::inexact::Inexact;
 use crate::op::{Atomic, BuiltIn, Op, Operand};
+use crate::probe::Probe;
 use crate::resource::{Buffer, Texture};
 use crate::sampler::Sampler;
 
@@ -39,6 +41,7 @@ pub(crate) struct Machine<'a> {
     /// Instruction that is running.
     current: usize,
     checker: Option<Checker>,
+    probing: Option<Box<probe::Probing>>,
 }
 
 /// For each binding the first one with the same resource, if the kernel can write that.
@@ -72,6 +75,7 @@ impl<'a> Machine<'a> {
             group_count,
             current: 0,
             checker: None,
+            probing: None,
         }
     }
 
@@ -79,6 +83,17 @@ impl<'a> Machine<'a> {
     pub(crate) fn checked(code: &'a Code, bound: &'a [Bound<'a>], group_count: [u32; 3]) -> Self {
         let checker = Checker::new(group_count, Shared::new(written_resources(code, bound)));
         Self { checker: Some(checker), ..Self::new(code, bound, group_count) }
+    }
+
+    /// A machine that watches what happens to numbers.
+    pub(crate) fn probed(code: &'a Code, bound: &'a [Bound<'a>], group_count: [u32; 3]) -> Self {
+        let machine = Self::new(code, bound, group_count);
+        let probing = probe::Probing::new(machine.lanes.len(), machine.scalars.len());
+        Self { probing: Some(Box::new(probing)), ..machine }
+    }
+
+    pub(crate) fn into_probe(self) -> Probe {
+        self.probing.map(|probing| probing.recorder.into_probe()).unwrap_or_default()
     }
 
     pub(crate) fn into_faults(self) -> Vec<Fault> {
@@ -90,6 +105,9 @@ impl<'a> Machine<'a> {
         self.workgroup.fill(0);
         if let Some(checker) = &mut self.checker {
             checker.begin(group, self.workgroup.len());
+        }
+        if let Some(probing) = &mut self.probing {
+            probing.recorder.workgroup = group;
         }
         run(self);
     }
@@ -278,6 +296,9 @@ fn run<'a>(machine: &mut Machine<'a>) {
     while let Some(op) = code.ops.get(counter) {
         machine.current = counter;
         counter += 1;
+        if machine.probing.is_some() {
+            machine.probe(op);
+        }
         match *op {
             Op::Unary { op, to, a } => {
                 macro_rules! apply {

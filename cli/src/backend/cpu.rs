@@ -8,19 +8,30 @@ use half::f16;
 use limpid::{FrameInputs, Plan, Settings};
 use limpid_cpu::{Denoiser, Inputs, TexelFormat, Texture};
 
-use super::{Backend, Denoised, ListedRay, Tracer, timed, to_half, trace_listed};
+use super::{Backend, Denoised, ListedRay, Tracer, split, timed, to_half, trace_listed};
 use crate::sequence::Frame;
 
-pub(super) struct Cpu {
+pub(crate) struct Cpu {
     description: String,
     denoiser: Denoiser,
 }
 
 impl Cpu {
-    pub(super) fn open(settings: &Settings, size: UVec2) -> Result<Self> {
+    pub(crate) fn open(settings: &Settings, size: UVec2) -> Result<Self> {
         let denoiser = Denoiser::new(settings, size)?;
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         Ok(Self { description: format!("the CPU ({threads} threads, no driver)"), denoiser })
+    }
+
+    /// The same, watching what happens to numbers.
+    pub(crate) fn open_probed(settings: &Settings, size: UVec2) -> Result<Self> {
+        let mut cpu = Self::open(settings, size)?;
+        cpu.denoiser.probe();
+        Ok(cpu)
+    }
+
+    pub(crate) fn denoiser(&self) -> &Denoiser {
+        &self.denoiser
     }
 }
 
@@ -39,14 +50,14 @@ fn radiance_texture(size: UVec2, radiance: &[[f32; 4]]) -> Texture {
     texture
 }
 
-fn output(texture: &Texture, size: UVec2) -> Vec<[f32; 3]> {
+/// Radiance and variance.
+fn output(texture: &Texture, size: UVec2) -> (Vec<[f32; 3]>, Vec<f32>) {
     let words = texture.read();
     let row = texture.size()[0] as usize * 2;
-    let half = |bits: u32| f16::from_bits(bits as u16).to_f32();
     let rows = words.chunks_exact(row).take(size.y as usize);
-    rows.flat_map(|row| row[..size.x as usize * 2].chunks_exact(2))
-        .map(|texel| [half(texel[0]), half(texel[0] >> 16), half(texel[1])])
-        .collect()
+    let texels = rows.flat_map(|row| row[..size.x as usize * 2].chunks_exact(2));
+    let half = |bits: u32| f16::from_bits(bits as u16);
+    split(texels.map(|texel| [half(texel[0]), half(texel[0] >> 16), half(texel[1]), half(texel[1] >> 16)]))
 }
 
 impl Backend for Cpu {
@@ -85,7 +96,7 @@ impl Backend for Cpu {
         }
         let inputs = Inputs { radiance: &radiance, normal, roughness, depth, motion, environment: None };
         timed(&mut time, &mut cpu_time, || self.denoiser.run_denoise(&inputs))?;
-        let radiance = output(self.denoiser.output(), size);
-        Ok(Denoised { radiance, time, cpu_time, pass_times: Vec::new(), rays, traced })
+        let (radiance, variance) = output(self.denoiser.output(), size);
+        Ok(Denoised { radiance, variance, time, cpu_time, pass_times: Vec::new(), rays, traced })
     }
 }

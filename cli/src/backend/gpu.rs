@@ -9,7 +9,7 @@ use half::f16;
 use limpid::{FrameInputs, Plan, Settings};
 use limpid_wgpu::{Denoiser, Inputs, Options, PassTime};
 
-use super::{Backend, Denoised, ListedRay, Tracer, timed, to_half, trace_listed};
+use super::{Backend, Denoised, ListedRay, Tracer, split, timed, to_half, trace_listed};
 use crate::sequence::Frame;
 
 /// An input image on the device.
@@ -202,7 +202,7 @@ impl Gpu {
         Ok(words.into_iter().take(count[0] as usize).map(ListedRay::unpack).collect())
     }
 
-    fn read_output(&self, size: UVec2) -> Result<Vec<[f32; 3]>> {
+    fn read_output(&self, size: UVec2) -> Result<(Vec<[f32; 3]>, Vec<f32>)> {
         let mut encoder = self.encoder();
         let row = (size.x * 8).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = self.readback_buffer(u64::from(row) * u64::from(size.y));
@@ -214,12 +214,9 @@ impl Gpu {
         );
         self.queue.submit([encoder.finish()]);
         let bytes = self.read(&buffer)?;
-        let mut radiance = Vec::with_capacity((size.x * size.y) as usize);
-        for row in bytes.chunks_exact(row as usize) {
-            let halves: Vec<[f16; 4]> = bytemuck::pod_collect_to_vec(&row[..size.x as usize * 8]);
-            radiance.extend(halves.iter().map(|&[r, g, b, _]| [r.to_f32(), g.to_f32(), b.to_f32()]));
-        }
-        Ok(radiance)
+        let rows = bytes.chunks_exact(row as usize);
+        let texels = rows.flat_map(|row| bytemuck::pod_collect_to_vec::<u8, [f16; 4]>(&row[..size.x as usize * 8]));
+        Ok(split(texels))
     }
 
     fn read_times(&self) -> Result<Vec<(String, Duration)>> {
@@ -267,7 +264,7 @@ impl Backend for Gpu {
         }
         self.denoiser.encode_denoise(&mut encoder, &self.images.inputs())?;
         self.run(encoder, &mut time, &mut cpu_time)?;
-        let radiance = self.read_output(frame.size)?;
-        Ok(Denoised { radiance, time, cpu_time, pass_times: self.read_times()?, rays, traced })
+        let (radiance, variance) = self.read_output(frame.size)?;
+        Ok(Denoised { radiance, variance, time, cpu_time, pass_times: self.read_times()?, rays, traced })
     }
 }

@@ -15,12 +15,15 @@ use limpid::settings::DepthEncoding;
 use limpid::{Plan, Settings};
 
 use crate::sequence::Frame;
+pub(crate) use cpu::Cpu;
 
 /// A denoised frame and what it took.
 #[derive(Debug, Clone)]
 pub struct Denoised {
     /// Linear radiance, row by row.
     pub radiance: Vec<[f32; 3]>,
+    /// Temporal variance, 0 to 1, row by row.
+    pub variance: Vec<f32>,
     /// From submission until the device was done, uploads and read-back excluded.
     pub time: Duration,
     /// Time that all processors together spent on it, for devices that are processors.
@@ -76,18 +79,58 @@ pub enum Choice {
     Cpu,
 }
 
+impl Choice {
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Wgpu => "wgpu",
+            Self::Ash => "ash",
+            Self::Cpu => "cpu",
+        }
+    }
+}
+
+/// Splits texels into radiance and variance.
+fn split(texels: impl Iterator<Item = [f16; 4]>) -> (Vec<[f32; 3]>, Vec<f32>) {
+    texels.map(|[r, g, b, a]| ([r.to_f32(), g.to_f32(), b.to_f32()], a.to_f32())).unzip()
+}
+
+/// What automatic choice comes to on this machine, said on standard error where that is the CPU; other choices as
+/// they are.
+pub fn settle(choice: Choice) -> Choice {
+    if choice != Choice::Auto {
+        return choice;
+    }
+    match gpu::Gpu::open(&Settings::default(), UVec2::ONE) {
+        Ok(_) => Choice::Wgpu,
+        Err(error) => {
+            eprintln!("note: running on the CPU, because {error:#}");
+            Choice::Cpu
+        }
+    }
+}
+
 /// Opens a backend for images of up to `size` pixels.
 ///
 /// # Errors
 ///
 /// When settings or size are refused, or there is no device of the kind asked for.
 pub fn open(choice: Choice, settings: &Settings, size: UVec2) -> Result<Box<dyn Backend>> {
-    // What limpid itself refuses, every backend would.
-    Plan::new(settings, size)?;
     // Sequences hold linear depth.
     let mut settings = settings.clone();
     settings.conventions.depth = DepthEncoding::Linear;
-    let settings = &settings;
+    open_encoded(choice, &settings, size)
+}
+
+/// Opens a backend for frames whose depth is encoded as the settings say.
+///
+/// # Errors
+///
+/// As [`open`].
+pub fn open_encoded(choice: Choice, settings: &Settings, size: UVec2) -> Result<Box<dyn Backend>> {
+    // What limpid itself refuses, every backend would.
+    Plan::new(settings, size)?;
     match choice {
         Choice::Ash => Ok(Box::new(vulkan::Vulkan::open(settings, size)?)),
         Choice::Wgpu => Ok(Box::new(gpu::Gpu::open(settings, size)?)),

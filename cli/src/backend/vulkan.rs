@@ -11,7 +11,7 @@ use limpid_ash::ash::vk::Format;
 use limpid_ash::offscreen::{Context, ContextOptions, Session, UploadedImage, UploadedInputs};
 use limpid_ash::{Denoiser, Options};
 
-use super::{Backend, Denoised, ListedRay, Tracer, timed, to_half, trace_listed};
+use super::{Backend, Denoised, ListedRay, Tracer, split, timed, to_half, trace_listed};
 use crate::sequence::Frame;
 
 pub(super) struct Vulkan {
@@ -55,12 +55,11 @@ fn listed_rays(context: &Context, denoiser: &Denoiser) -> Result<Vec<ListedRay>>
     Ok(words.into_iter().take(count).map(ListedRay::unpack).collect())
 }
 
-fn read_output(context: &Context, denoiser: &Denoiser, size: UVec2) -> Result<Vec<[f32; 3]>> {
+fn read_output(context: &Context, denoiser: &Denoiser, size: UVec2) -> Result<(Vec<[f32; 3]>, Vec<f32>)> {
     let output = denoiser.output();
     let halves: Vec<[f16; 4]> = bytemuck::pod_collect_to_vec(&context.read_image(&output)?);
     let rows = halves.chunks_exact(output.size.x as usize).take(size.y as usize);
-    let texels = rows.flat_map(|row| &row[..size.x as usize]);
-    Ok(texels.map(|&[r, g, b, _]| [r.to_f32(), g.to_f32(), b.to_f32()]).collect())
+    Ok(split(rows.flat_map(|row| &row[..size.x as usize]).copied()))
 }
 
 impl Backend for Vulkan {
@@ -102,7 +101,7 @@ impl Backend for Vulkan {
         }
         let pass_times = session.denoiser().read_times()?.unwrap_or_default();
         let pass_times = pass_times.into_iter().map(|time| (time.kernel, time.duration)).collect();
-        let radiance = read_output(context, session.denoiser(), size)?;
-        Ok(Denoised { radiance, time, cpu_time, pass_times, rays, traced })
+        let (radiance, variance) = read_output(context, session.denoiser(), size)?;
+        Ok(Denoised { radiance, variance, time, cpu_time, pass_times, rays, traced })
     }
 }

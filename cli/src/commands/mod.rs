@@ -1,12 +1,15 @@
 //! The subcommands.
 
 mod analyze;
+mod bench;
 mod demo;
 mod denoise;
 mod export;
+mod interrupt;
 mod plan;
 mod report;
 mod settings;
+mod stability;
 
 use std::io::Write;
 
@@ -32,6 +35,10 @@ enum Command {
     Analyze(analyze::Analyze),
     /// Writes shaders, tables and documents for engines that do not link Rust.
     Export(Box<export::Export>),
+    /// Measures error against run time, over presets, settings and features, and writes a report.
+    Bench(Box<bench::Bench>),
+    /// Tries to break the numbers of every preset on every backend, and judges the results by criteria.
+    Stability(stability::Stability),
     /// Prints what is allocated and dispatched for some settings and size.
     Plan(plan::PlanCommand),
 }
@@ -48,6 +55,8 @@ impl Cli {
             Command::Denoise(denoise) => denoise.run(),
             Command::Analyze(analyze) => analyze.run(),
             Command::Export(export) => export.run(),
+            Command::Bench(bench) => bench.run(),
+            Command::Stability(stability) => stability.run(),
             Command::Plan(plan) => plan.run(),
         }
     }

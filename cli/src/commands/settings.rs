@@ -66,6 +66,10 @@ impl SettingsOptions {
         self.settings.as_deref()
     }
 
+    pub(crate) fn new(preset: &str, settings: Option<&Path>, set: &[String]) -> Self {
+        Self { preset: preset.to_owned(), settings: settings.map(Path::to_owned), set: set.to_vec() }
+    }
+
     pub(crate) fn load(&self) -> Result<Settings> {
         let preset = Preset::ALL.iter().find(|(name, _)| *name == self.preset);
         let (_, preset) = preset.with_context(|| format!("there is no preset `{}`", self.preset))?;

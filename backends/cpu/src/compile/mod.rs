@@ -56,6 +56,8 @@ pub(crate) struct Code {
     pub(crate) ops: Vec<Op>,
     /// Where in the source each instruction comes from.
     pub(crate) spans: Vec<naga::Span>,
+    /// The lane register that tells which invocations are active at each instruction; none for all.
+    pub(crate) masks: Vec<Option<u32>>,
     pub(crate) lane_registers: u32,
     pub(crate) scalar_registers: u32,
     pub(crate) tables: Vec<Vec<u32>>,
@@ -147,6 +149,7 @@ struct Compiler<'a> {
     info: &'a ModuleInfo,
     ops: Vec<Op>,
     spans: Vec<naga::Span>,
+    masks: Vec<Option<u32>>,
     /// Where in the source the compiler is.
     span: naga::Span,
     registers: Registers,
@@ -194,6 +197,7 @@ pub(crate) fn compile(module: &Module, info: &ModuleInfo, entry_point: &str) -> 
             return Ok(Code {
                 ops: compiler.ops,
                 spans: compiler.spans,
+                masks: compiler.masks,
                 lane_registers: compiler.registers.count(),
                 scalar_registers: compiler.scalars,
                 tables: compiler.tables,
@@ -215,6 +219,7 @@ impl<'a> Compiler<'a> {
             info,
             ops: Vec::new(),
             spans: Vec::new(),
+            masks: Vec::new(),
             span: naga::Span::UNDEFINED,
             registers: Registers::default(),
             scalars: 0,
@@ -243,6 +248,7 @@ impl<'a> Compiler<'a> {
     fn emit(&mut self, op: Op) {
         self.ops.push(op);
         self.spans.push(self.span);
+        self.masks.push(self.mask);
     }
 
     fn scalar(&mut self) -> Operand {

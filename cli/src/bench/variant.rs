@@ -1,0 +1,131 @@
+//! What is compared: presets, single settings, and the pipeline with one feature left out.
+
+use anyhow::Result;
+use limpid::{Preset, Settings};
+use serde::{Deserialize, Serialize};
+
+/// Why a variant is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Group {
+    /// Not limpid: something to compare with.
+    Baseline,
+    /// A preset.
+    Preset,
+    /// Settings that the user asked for.
+    Chosen,
+    /// The default preset without one feature.
+    Ablation,
+}
+
+/// One way to denoise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Variant {
+    /// Unique name.
+    pub name: String,
+    /// Why it is there.
+    pub group: Group,
+    /// What it is, in a line.
+    pub note: String,
+    /// Settings; `None` for baselines.
+    pub settings: Option<Settings>,
+}
+
+/// Name of the variant that times are compared with.
+pub const REFERENCE: &str = "reference";
+/// Name of the noisy input as a baseline.
+pub const NOISY: &str = "noisy";
+/// Name of plain accumulation.
+pub const ACCUMULATION: &str = "accumulation";
+
+/// Name, what is left out, and the settings that leave it out.
+pub const ABLATIONS: &[(&str, &str, &[&str])] = &[
+    ("no-history", "no temporal accumulation", &["reproject.min_history_cap=1", "reproject.max_history=1"]),
+    ("no-parallax", "no reprojection by hit distance", &["reproject.parallax_normal_cosine=1"]),
+    ("no-colour-gate", "no colour test on surface history", &["reproject.surface_color_gate=10000"]),
+    ("no-disocclusion", "no test of history's normal and depth", &["reproject.disocclusion_threshold=0"]),
+    ("no-prefilter", "no spatial blur", &["prefilter.variance_weight_floor=0", "prefilter.variance_falloff=0"]),
+    ("no-normal-weight", "blur across normals", &["prefilter.normal_power=0"]),
+    ("no-depth-weight", "blur across depth", &["prefilter.depth_falloff=0"]),
+    (
+        "no-radiance-weight",
+        "blur without regard to brightness",
+        &["prefilter.radiance_falloff=0", "prefilter.radiance_variance_falloff=0"],
+    ),
+    ("no-average-weight", "plain 8x8 average", &["reproject.average_luminance_falloff=0"]),
+    ("no-average-pull", "clip box around the neighbourhood's mean", &["resolve.clip_average_pull=0"]),
+    ("no-clipping", "history and colour are not clipped", &["resolve.clip_scale=1000"]),
+];
+
+impl Variant {
+    /// What there is without limpid: the noisy input and plain accumulation.
+    pub fn baselines() -> [Self; 2] {
+        let baseline = |name: &str, note: &str| Self {
+            name: name.to_owned(),
+            group: Group::Baseline,
+            note: note.to_owned(),
+            settings: None,
+        };
+        [
+            baseline(NOISY, "one ray a pixel, as traced"),
+            baseline(ACCUMULATION, "reprojected by motion vectors and averaged, up to 32 frames, nothing else"),
+        ]
+    }
+
+    /// A preset by its name on the command line.
+    pub fn preset(name: &str, preset: Preset) -> Self {
+        let settings = Some(preset.settings());
+        Self { name: name.to_owned(), group: Group::Preset, note: format!("preset {name}"), settings }
+    }
+
+    /// The default preset without each feature; `load` turns `PATH=VALUE` options into settings.
+    ///
+    /// # Errors
+    ///
+    /// Those of `load`.
+    pub fn ablations(load: impl Fn(&[String]) -> Result<Settings>) -> Result<Vec<Self>> {
+        let ablation = |(name, note, options): &(&str, &str, &[&str])| {
+            let options: Vec<String> = options.iter().map(|option| (*option).to_owned()).collect();
+            Ok(Self {
+                name: (*name).to_owned(),
+                group: Group::Ablation,
+                note: format!("{note}: {}", options.join(", ")),
+                settings: Some(load(&options)?),
+            })
+        };
+        ABLATIONS.iter().map(ablation).collect()
+    }
+
+    /// A variant for each value of `PATH=A,B,C`. Commas inside of brackets separate nothing.
+    ///
+    /// # Errors
+    ///
+    /// Those of `load`.
+    pub fn sweep(option: &str, load: impl Fn(&[String]) -> Result<Settings>) -> Result<Vec<Self>> {
+        let (path, values) = option.split_once('=').unwrap_or((option, ""));
+        let variant = |value: String| {
+            let name = if option.contains('=') { format!("{path}={value}") } else { path.to_owned() };
+            let settings = Some(load(std::slice::from_ref(&name))?);
+            Ok(Self { note: format!("default preset with {name}"), name, group: Group::Chosen, settings })
+        };
+        split_values(values).into_iter().map(variant).collect()
+    }
+}
+
+fn split_values(text: &str) -> Vec<String> {
+    let mut depth = 0;
+    let mut values = vec![String::new()];
+    for c in text.chars() {
+        match c {
+            '[' => depth += 1,
+            ']' => depth -= 1,
+            ',' if depth == 0 => {
+                values.push(String::new());
+                continue;
+            }
+            _ => {}
+        }
+        values.last_mut().expect("there is always one").push(c);
+    }
+    values
+}
