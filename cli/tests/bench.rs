@@ -94,6 +94,7 @@ fn mistakes_are_named() {
         (&["--scene", "nowhere"][..], "no scene `nowhere`"),
         (&["--scene", "still", "--set", "resolve.stability=0.5,7"], "`resolve.stability` is 7"),
         (&["--scene", "still", "--preset", "best"], "no preset `best`"),
+        (&["--scene", "still", "--scene", "still", "--no-ablations"], "two sequences are called `still`"),
         (&["--compare", "a.json", "b.json"], "cannot read a.json"),
     ] {
         let output = bench(&out, arguments);

@@ -1,5 +1,6 @@
 //! `limpid bench`.
 
+use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -298,7 +299,10 @@ impl Bench {
             let budget = Duration::from_secs(self.scaling_seconds);
             let first = subject.frames.len().min(2);
             let points = scaling(choice, &variant, &subject.frames[..first], budget, &interrupt::requested)?;
-            report.scaling.extend(points);
+            // Half a curve would pass for a whole one.
+            if !interrupt::requested() {
+                report.scaling.extend(points);
+            }
         }
         Ok(())
     }
@@ -343,9 +347,10 @@ impl Bench {
         }
         interrupt::listen()?;
         eprintln!("{} variants on {}", variants.len(), report.device);
+        let mut names = HashSet::new();
         for source in self.sources() {
             let Some(subject) = self.load(&source)? else { break };
-            if report.sequences.iter().filter(|sequence| sequence.name == subject.name).count() > 1 {
+            if !names.insert(subject.name.clone()) {
                 bail!("two sequences are called `{}`", subject.name);
             }
             if !self.measure(choice, &subject, &mut report)? {
