@@ -10,9 +10,8 @@ use limpid::resource::Copy;
 use limpid::settings::Fallback;
 use limpid_harness::executor::Cpu;
 use limpid_harness::strategy::{Field, FrameSpec, Motion, Normals, Spec, any_spec, set_number};
-use limpid_harness::{Executor, Snapshot, Table, executors};
+use limpid_harness::{Executor, Snapshot, Table, executors, runner};
 use proptest::prelude::*;
-use proptest::test_runner::{Config, TestRunner};
 
 /// Two devices agree in a frame if no more than this share of a resource's values is more than two half-float steps
 /// apart, or so few values as may be so however small the image is. Divisions, exponentials, logarithms and roots
@@ -118,9 +117,8 @@ fn check_spec(spec: &Spec, all: &mut [Box<dyn Executor>], tallies: &mut Tallies)
 #[test]
 fn random_sequences_are_the_same_everywhere() {
     let state = RefCell::new((executors(), Tallies::new()));
-    let cases = std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(48);
-    let config = Config { source_file: Some(file!()), cases, max_shrink_iters: 400, ..Config::default() };
-    let result = TestRunner::new(config).run(&any_spec(), |spec| {
+    let (mut runner, cases) = runner(file!(), 48);
+    let result = runner.run(&any_spec(), |spec| {
         let (all, tallies) = &mut *state.borrow_mut();
         check_spec(&spec, all, tallies)
     });

@@ -7,9 +7,8 @@ use limpid::Preset;
 use limpid::settings::{DepthEncoding, Fallback};
 use limpid_harness::executor::Cpu;
 use limpid_harness::strategy::{any_spec, noise};
-use limpid_harness::{Case, Executor, Pixel, Snapshot, fastest};
+use limpid_harness::{Case, Executor, Pixel, Snapshot, fastest, runner};
 use proptest::prelude::*;
-use proptest::test_runner::{Config, TestRunner};
 
 /// One rounding of a half float, relative.
 const HALF_STEP: f32 = 1.0 / 1024.0;
@@ -21,9 +20,8 @@ fn for_all<S: Strategy>(
     property: impl Fn(&mut dyn Executor, S::Value) -> Result<(), TestCaseError>,
 ) {
     let executor = RefCell::new(fastest());
-    let cases = std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(cases);
-    let config = Config { source_file: Some(file!()), cases, ..Config::default() };
-    let result = TestRunner::new(config).run(&strategy, |value| property(executor.borrow_mut().as_mut(), value));
+    let (mut runner, _) = runner(file!(), cases);
+    let result = runner.run(&strategy, |value| property(executor.borrow_mut().as_mut(), value));
     if let Err(error) = result {
         panic!("{error}");
     }
@@ -221,9 +219,8 @@ fn the_output_stays_between_the_darkest_and_the_brightest_input() {
 /// The checked mode of the CPU runs workgroups one after the other, the other mode as threads come.
 #[test]
 fn the_order_of_workgroups_does_not_matter() {
-    let cases = std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(16);
-    let config = Config { source_file: Some(file!()), cases, ..Config::default() };
-    let result = TestRunner::new(config).run(&any_spec(), |spec| {
+    let (mut runner, _) = runner(file!(), 16);
+    let result = runner.run(&any_spec(), |spec| {
         let case = spec.case();
         let mut watched = Cpu::watched();
         prop_assert_eq!(case.run(&mut watched), case.run(&mut Cpu::new()));

@@ -14,6 +14,8 @@ pub use case::{Case, Change, Image, Images, Pixel, Step, TexelFormat, half_bits}
 pub use executor::{Executor, executors, fastest};
 pub use snapshot::Snapshot;
 
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+
 /// Says on standard error that a test does not run, past the test harness, which keeps to itself what a passing
 /// test prints. With `LIMPID_REQUIRE_DEVICE` set it fails instead.
 ///
@@ -24,4 +26,18 @@ pub fn skip(reason: &str) {
     use std::io::Write;
     assert!(std::env::var_os("LIMPID_REQUIRE_DEVICE").is_none(), "{reason}");
     let _ = writeln!(std::io::stderr(), "SKIPPED: {reason}");
+}
+
+/// A runner for random cases, and how many: the same ones in every run, so that a gate does not depend on chance,
+/// unless `PROPTEST_CASES` asks for so many new ones. Failures of those are kept beside `source_file`.
+pub fn runner(source_file: &'static str, cases: u32) -> (TestRunner, u32) {
+    let asked = std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok());
+    let cases_to_run = asked.unwrap_or(cases);
+    let config =
+        Config { source_file: Some(source_file), cases: cases_to_run, max_shrink_iters: 400, ..Config::default() };
+    let runner = match asked {
+        Some(_) => TestRunner::new(config),
+        None => TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha)),
+    };
+    (runner, cases_to_run)
 }
