@@ -52,7 +52,7 @@ fn compare(exact: &Snapshot, inexact: &[&Snapshot], device: &Snapshot, count: &m
 fn devices_differ_by_what_vulkan_lets_them() {
     let all = RefCell::new(executors().into_iter().filter(|executor| executor.backend() == "ash").collect::<Vec<_>>());
     let count = RefCell::new(Count::default());
-    let (mut runner, cases) = runner(file!(), 24);
+    let (mut runner, cases) = runner(file!(), 60);
     let result = runner.run(&any_spec(), |spec| {
         let case = spec.case();
         let exact = case.run(&mut Cpu::new());
