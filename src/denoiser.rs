@@ -5,7 +5,7 @@ use glam::UVec2;
 use crate::frame::{self, FrameConstants, FrameInputs, Previous};
 use crate::kernel::Kernel;
 use crate::plan::{Grid, Plan};
-use crate::resource::Extent;
+use crate::resource::{Extent, TILE_SIZE};
 use crate::settings::Settings;
 use crate::{Error, plan};
 
@@ -27,6 +27,10 @@ impl FrameSchedule {
             Grid::Tiles => {
                 let tiles = Extent::Tile.of(UVec2::from_array(self.constants.size));
                 Some([tiles.x, tiles.y, 1])
+            }
+            Grid::BlockTiles => {
+                let groups = (Extent::Block.of(UVec2::from_array(self.constants.size)) + (TILE_SIZE - 1)) / TILE_SIZE;
+                Some([groups.x, groups.y, 1])
             }
             Grid::Indirect { .. } => None,
         }
@@ -120,7 +124,7 @@ impl Denoiser {
     /// [`Error::Size`], [`Error::Camera`] or [`Error::FrameInput`]; the denoiser is as before then.
     pub fn next_frame(&mut self, inputs: &FrameInputs) -> Result<FrameSchedule, Error> {
         let previous = if self.started.is_some() { None } else { self.previous };
-        let constants = frame::constants(&self.settings, inputs, self.plan.size, previous)?;
+        let constants = frame::constants(&self.settings, inputs, self.plan.size, previous, self.frame_index)?;
         let phase = (self.frame_index % 2) as usize;
         self.frame_index = self.frame_index.wrapping_add(1);
         self.previous = Some(Previous { camera: inputs.camera, size: inputs.size });

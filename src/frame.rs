@@ -70,11 +70,13 @@ constants! {
     FrameConstants {
         world_from_pixel: [[f32; 4]; 4],
         prev_uv_from_world: [[f32; 4]; 4],
+        world_from_prev_pixel: [[f32; 4]; 4],
         environment_from_world: [[f32; 4]; 4],
         depth_from_device: [f32; 4],
         neighborhood_weights: [f32; 4],
         forward: [f32; 4],
         clip_w: [f32; 2],
+        prev_clip_w: [f32; 2],
         sky_depth: [f32; 2],
         motion_scale: [f32; 2],
         motion_offset: [f32; 2],
@@ -83,6 +85,8 @@ constants! {
         prev_size: [u32; 2],
         exposure: f32,
         inverse_exposure: f32,
+        frame_index: u32,
+        pixels_per_unit: f32,
         roughness_threshold: f32,
         mirror_roughness: f32,
         ray_variance_threshold: f32,
@@ -113,6 +117,18 @@ constants! {
         clip_scale: f32,
         clip_average_pull: f32,
         clip_extent_floor: f32,
+        accumulate_max_history: f32,
+        accumulate_mirror_history: f32,
+        accumulate_clip_roughness: f32,
+        accumulate_clip_scale: f32,
+        outlier_factor: f32,
+        excess_limit: f32,
+        disagreement_limit: f32,
+        light_change_sigma: f32,
+        light_change_share: f32,
+        filter_scale: f32,
+        excess_scale: f32,
+        grazing_width: f32,
         history_length_steps: f32,
         constant_roughness: f32,
     }
@@ -162,7 +178,7 @@ fn forward_sign(view_to_clip: &DMat4, reversed: bool) -> f64 {
 }
 
 /// (x w, y w, depth, 1) to view space, with w = clip_w.x + clip_w.y depth.
-fn view_from_pixel(camera: &Camera, size: DVec2, ndc_y: f64, sign: f64) -> (DMat4, DVec2) {
+fn pixel_to_view(camera: &Camera, size: DVec2, ndc_y: f64, sign: f64) -> (DMat4, DVec2) {
     let p = camera.view_to_clip.as_dmat4();
     let clip_w = DVec2::new(p.w_axis.w, p.z_axis.w * sign);
     // ndc = scale * pixel + offset
@@ -211,6 +227,7 @@ pub(crate) fn constants(
     inputs: &FrameInputs,
     allocated: UVec2,
     previous: Option<Previous>,
+    frame_index: u32,
 ) -> Result<FrameConstants, Error> {
     check_frame(inputs, allocated)?;
     let camera = &inputs.camera;
@@ -225,7 +242,7 @@ pub(crate) fn constants(
     let sign = forward_sign(&p, reversed);
     let view_to_world = camera.world_to_view.as_dmat4().inverse();
     let eye = view_to_world.w_axis.truncate();
-    let (view_from_pixel, clip_w) = view_from_pixel(camera, size, ndc_y, sign);
+    let (view_from_pixel, clip_w) = pixel_to_view(camera, size, ndc_y, sign);
     // Relative to the eye, so that coordinates stay small in large worlds.
     let mut view_to_relative = view_to_world;
     view_to_relative.w_axis = DVec4::W;
@@ -242,6 +259,11 @@ pub(crate) fn constants(
         * prev_camera.world_to_view.as_dmat4()
         * DMat4::from_translation(eye);
 
+    let prev_sign = forward_sign(&prev_camera.view_to_clip.as_dmat4(), reversed);
+    let (view_from_prev_pixel, prev_clip_w) = pixel_to_view(&prev_camera, prev_size.as_dvec2(), ndc_y, prev_sign);
+    let world_from_prev_pixel =
+        DMat4::from_translation(-eye) * prev_camera.world_to_view.as_dmat4().inverse() * view_from_prev_pixel;
+
     let (depth_from_device, sky_depth) = match conventions.depth {
         DepthEncoding::Device => ([p.w_axis.z, -p.w_axis.w, -p.z_axis.z, p.z_axis.w], [f32::MIN, 1.0]),
         DepthEncoding::ReversedDevice => ([p.w_axis.z, -p.w_axis.w, -p.z_axis.z, p.z_axis.w], [0.0, f32::MAX]),
@@ -257,16 +279,19 @@ pub(crate) fn constants(
     };
     let environment = settings.coverage.environment_from_world.as_dmat3();
     let (reproject, prefilter, resolve) = (&settings.reproject, &settings.prefilter, &settings.resolve);
+    let (accumulate, footprint) = (&settings.accumulate, &settings.footprint);
     let ray_list = settings.coverage.ray_list.as_ref();
     let neighborhood = |i: f32| (-reproject.neighborhood_falloff * i * i / 25.0).exp();
     Ok(FrameConstants {
         world_from_pixel: columns(view_to_relative * view_from_pixel),
         prev_uv_from_world: columns(prev_uv_from_world),
+        world_from_prev_pixel: columns(world_from_prev_pixel),
         environment_from_world: columns(DMat4::from_mat3(environment)),
         depth_from_device: depth_from_device.map(|x| x as f32),
         neighborhood_weights: [1.0, 2.0, 3.0, 4.0].map(neighborhood),
         forward: (view_to_relative * DVec4::new(0.0, 0.0, sign, 0.0)).normalize().as_vec4().to_array(),
         clip_w: clip_w.as_vec2().to_array(),
+        prev_clip_w: prev_clip_w.as_vec2().to_array(),
         sky_depth,
         motion_scale: conventions.motion_scale.to_array(),
         motion_offset: motion_offset.as_vec2().to_array(),
@@ -275,6 +300,8 @@ pub(crate) fn constants(
         prev_size: if previous.is_some() && !inputs.reset { prev_size.to_array() } else { [0, 0] },
         exposure: inputs.exposure,
         inverse_exposure: 1.0 / inputs.exposure,
+        frame_index,
+        pixels_per_unit: (size.y * p.y_axis.y.abs() / 2.0) as f32,
         roughness_threshold: settings.coverage.roughness_threshold,
         mirror_roughness: settings.coverage.mirror_roughness,
         ray_variance_threshold: ray_list.and_then(|list| list.variance_threshold).unwrap_or(1.0),
@@ -305,6 +332,18 @@ pub(crate) fn constants(
         clip_scale: resolve.clip_scale,
         clip_average_pull: resolve.clip_average_pull,
         clip_extent_floor: resolve.clip_extent_floor,
+        accumulate_max_history: accumulate.max_history,
+        accumulate_mirror_history: accumulate.mirror_history,
+        accumulate_clip_roughness: accumulate.clip_roughness,
+        accumulate_clip_scale: accumulate.clip_scale,
+        outlier_factor: accumulate.outlier_factor,
+        excess_limit: accumulate.excess_limit,
+        disagreement_limit: accumulate.disagreement_limit,
+        light_change_sigma: accumulate.light_change_sigma,
+        light_change_share: accumulate.light_change_share,
+        filter_scale: footprint.filter_scale,
+        excess_scale: footprint.excess_scale,
+        grazing_width: footprint.grazing_width,
         history_length_steps: (255.0 / reproject.max_history).floor(),
         constant_roughness: settings.features.constant_roughness.unwrap_or(0.0),
     })

@@ -9,7 +9,7 @@ use crate::Error;
 use crate::frame::check_allocation;
 use crate::kernel::{Kernel, Overrides, Sources};
 use crate::resource::{Access, Copy, Count, Extent, Format, Kind, Lifetime, Resource};
-use crate::settings::{Channel, Fallback, NormalEncoding, RaysPerQuad, RoughnessEncoding, Settings};
+use crate::settings::{Channel, Fallback, NormalEncoding, Pipeline, RaysPerQuad, RoughnessEncoding, Settings};
 
 /// When in the frame a pass runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -30,6 +30,8 @@ pub enum Grid {
     One,
     /// One for each 8x8 tile of the frame's size.
     Tiles,
+    /// One for each 8x8 blocks of 4x4 pixels.
+    BlockTiles,
     /// Three `u32` in a buffer, written on the GPU.
     Indirect {
         /// Name of the buffer.
@@ -59,6 +61,8 @@ pub struct Bound {
 /// One dispatch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pass {
+    /// Name, unique in the plan.
+    pub name: String,
     /// Name of the kernel.
     pub kernel: String,
     /// When it runs.
@@ -85,12 +89,17 @@ pub struct Plan {
 /// Name of the texture that holds the denoised radiance.
 pub const OUTPUT: &str = "output";
 
+/// Averages over blocks of pixels, of which there are two.
+const BLOCKS: &str = "blocks";
+const OTHER_BLOCKS: &str = "other_blocks";
+
 /// What the caller reads: the denoised image, and the ray list with its length.
 const EXPORTED: &[&str] = &[OUTPUT, "rays", "args"];
 
 /// A pass before it is known which of its bindings the specialised kernel keeps.
 struct PassTemplate {
     kernel: &'static str,
+    is_needed: fn(&Settings) -> bool,
     stage: Stage,
     grid: GridTemplate,
     overrides: &'static [&'static str],
@@ -100,6 +109,7 @@ struct PassTemplate {
 enum GridTemplate {
     One,
     Tiles,
+    BlockTiles,
     /// A list of `args`.
     List(u64),
 }
@@ -112,6 +122,7 @@ use Copy::{Current, Previous};
 const PASSES: &[PassTemplate] = &[
     PassTemplate {
         kernel: "classify",
+        is_needed: always,
         stage: Stage::Classify,
         grid: GridTemplate::Tiles,
         overrides: &[
@@ -137,6 +148,7 @@ const PASSES: &[PassTemplate] = &[
     },
     PassTemplate {
         kernel: "indirect_args",
+        is_needed: always,
         stage: Stage::Classify,
         grid: GridTemplate::One,
         overrides: &[],
@@ -144,6 +156,7 @@ const PASSES: &[PassTemplate] = &[
     },
     PassTemplate {
         kernel: "reproject",
+        is_needed: always,
         stage: Stage::Denoise,
         grid: GridTemplate::List(0),
         overrides: &["MIRROR_PARALLAX", "SURFACE_MOTION", "HISTORY_SEARCH", "EDGE_REPAIR", "AVERAGE_IS_USED"],
@@ -162,6 +175,7 @@ const PASSES: &[PassTemplate] = &[
     },
     PassTemplate {
         kernel: "prefilter",
+        is_needed: |settings| settings.features.spatial_filter,
         stage: Stage::Denoise,
         grid: GridTemplate::List(0),
         overrides: &[],
@@ -177,6 +191,7 @@ const PASSES: &[PassTemplate] = &[
     },
     PassTemplate {
         kernel: "fill",
+        is_needed: always,
         stage: Stage::Denoise,
         grid: GridTemplate::List(1),
         overrides: &["FALLBACK"],
@@ -191,6 +206,7 @@ const PASSES: &[PassTemplate] = &[
     },
     PassTemplate {
         kernel: "resolve_temporal",
+        is_needed: always,
         stage: Stage::Denoise,
         grid: GridTemplate::List(0),
         overrides: &["FALLBACK", "SPATIAL_FILTER", "HISTORY_CLIP", "AVERAGE_MIXING", "AVERAGE_IS_READ"],
@@ -207,6 +223,127 @@ const PASSES: &[PassTemplate] = &[
         ],
     },
 ];
+
+/// Accumulates first, filters over the lobe's footprint after. Follows the first two of `PASSES`. Passes over blocks
+/// read the `blocks` that the last such pass wrote and write the other ones.
+const FOOTPRINT_PASSES: &[PassTemplate] = &[
+    PassTemplate {
+        kernel: "block_average",
+        is_needed: always,
+        stage: Stage::Denoise,
+        grid: GridTemplate::BlockTiles,
+        overrides: &["OUTLIER_SPREAD", "SAMPLES_ARE_USED"],
+        bindings: &[
+            ("in_radiance", "radiance", Current),
+            ("in_guide", "guide", Current),
+            ("out_blocks", BLOCKS, Current),
+            ("out_samples", "samples", Current),
+        ],
+    },
+    PassTemplate {
+        kernel: "block_statistics",
+        is_needed: always,
+        stage: Stage::Denoise,
+        grid: GridTemplate::BlockTiles,
+        overrides: &["LIGHT_CHANGE", "SURFACE_MOTION"],
+        bindings: &[
+            ("in_motion", "motion", Current),
+            ("in_blocks", BLOCKS, Current),
+            ("in_samples", "samples", Current),
+            ("in_prev_light", "light", Previous),
+            ("out_blocks", BLOCKS, Current),
+            ("out_light", "light", Current),
+        ],
+    },
+    PassTemplate {
+        kernel: "block_spread",
+        is_needed: |settings| settings.features.outlier_spread,
+        stage: Stage::Denoise,
+        grid: GridTemplate::BlockTiles,
+        overrides: &[],
+        bindings: &[("in_blocks", BLOCKS, Current), ("out_blocks", BLOCKS, Current)],
+    },
+    PassTemplate {
+        kernel: "accumulate",
+        is_needed: always,
+        stage: Stage::Denoise,
+        grid: GridTemplate::List(0),
+        overrides: &["MIRROR_PARALLAX", "SURFACE_MOTION", "HISTORY_CLIP", "LIGHT_CHANGE", "OUTLIER_SPREAD"],
+        bindings: &[
+            ("in_radiance", "radiance", Current),
+            ("in_motion", "motion", Current),
+            ("in_guide", "guide", Current),
+            ("in_prev_guide", "guide", Previous),
+            ("in_history", "history", Previous),
+            ("in_blocks", BLOCKS, Current),
+            ("in_samples", "samples", Current),
+            ("in_light", "light", Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
+            ("out_history", "history", Current),
+        ],
+    },
+    PassTemplate {
+        kernel: "block_average",
+        is_needed: has_wide_filter,
+        stage: Stage::Denoise,
+        grid: GridTemplate::BlockTiles,
+        overrides: &["ACCUMULATED"],
+        bindings: &[
+            ("in_guide", "guide", Current),
+            ("in_history", "history", Current),
+            ("out_blocks", BLOCKS, Current),
+        ],
+    },
+    PassTemplate {
+        kernel: "block_spread",
+        is_needed: has_wide_filter,
+        stage: Stage::Denoise,
+        grid: GridTemplate::BlockTiles,
+        overrides: &["ACCUMULATED"],
+        bindings: &[("in_blocks", BLOCKS, Current), ("out_blocks", BLOCKS, Current)],
+    },
+    PassTemplate {
+        kernel: "fill",
+        is_needed: always,
+        stage: Stage::Denoise,
+        grid: GridTemplate::List(1),
+        overrides: &["FALLBACK"],
+        bindings: &[
+            ("in_radiance", "radiance", Current),
+            ("in_environment", "environment", Current),
+            ("in_guide", "guide", Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
+            ("out_output", OUTPUT, Current),
+        ],
+    },
+    PassTemplate {
+        kernel: "lobe_filter",
+        is_needed: always,
+        stage: Stage::Denoise,
+        grid: GridTemplate::List(0),
+        overrides: &["FALLBACK", "NEAR_TAPS", "WIDE_FILTER"],
+        bindings: &[
+            ("in_radiance", "radiance", Current),
+            ("in_environment", "environment", Current),
+            ("in_guide", "guide", Current),
+            ("in_history", "history", Current),
+            ("in_blocks", BLOCKS, Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
+            ("out_output", OUTPUT, Current),
+        ],
+    },
+];
+
+fn always(_: &Settings) -> bool {
+    true
+}
+
+fn has_wide_filter(settings: &Settings) -> bool {
+    settings.features.spatial_filter && settings.features.wide_filter
+}
 
 /// All resources that passes can name.
 fn all_resources() -> Vec<Resource> {
@@ -232,6 +369,11 @@ fn all_resources() -> Vec<Resource> {
         resource("signal", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
         resource(OUTPUT, texture(Format::Rgba16Float, Extent::Full), Lifetime::Persistent, false),
         resource("average", texture(Format::Rgba16Float, Extent::Tile), Lifetime::Transient, false),
+        resource("history", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
+        resource(BLOCKS, texture(Format::Rgba32Uint, Extent::Block), Lifetime::Transient, false),
+        resource(OTHER_BLOCKS, texture(Format::Rgba32Uint, Extent::Block), Lifetime::Transient, false),
+        resource("samples", texture(Format::Rg32Uint, Extent::Block), Lifetime::Transient, false),
+        resource("light", texture(Format::R32Uint, Extent::Block), Lifetime::Persistent, true),
         resource("tiles", buffer(4, Count::Per(Extent::Tile), false), Lifetime::Transient, false),
         resource("rays", buffer(4, Count::Per(Extent::Full), false), Lifetime::Transient, false),
         resource("counters", buffer(4, Count::Fixed(4), false), Lifetime::Persistent, false),
@@ -268,7 +410,14 @@ fn override_value(settings: &Settings, name: &str) -> f64 {
         },
         "RAYS_FOLLOW_VARIANCE" => f64::from(ray_list.is_some_and(|list| list.variance_threshold.is_some())),
         "ROUGHNESS_IS_CONSTANT" => f64::from(features.constant_roughness.is_some()),
-        "AVERAGE_IS_USED" => f64::from(features.uses_average()),
+        "AVERAGE_IS_USED" => f64::from(settings.pipeline == Pipeline::Published && features.uses_average()),
+        // The template that names it means it.
+        "ACCUMULATED" => 1.0,
+        "LIGHT_CHANGE" => f64::from(features.light_change),
+        "OUTLIER_SPREAD" => f64::from(features.outlier_spread),
+        "SAMPLES_ARE_USED" => f64::from(features.light_change || features.outlier_spread),
+        "NEAR_TAPS" => f64::from(if features.spatial_filter { features.near_taps } else { 0 }),
+        "WIDE_FILTER" => f64::from(has_wide_filter(settings)),
         "AVERAGE_IS_READ" => f64::from(features.history_clip || features.average_mixing),
         "MIRROR_PARALLAX" => f64::from(features.mirror_parallax),
         "SURFACE_MOTION" => f64::from(features.surface_motion),
@@ -283,6 +432,26 @@ fn override_value(settings: &Settings, name: &str) -> f64 {
             Fallback::Environment => 2.0,
         },
         _ => unreachable!("templates name no other override"),
+    }
+}
+
+/// Passes that read a resource and write it take turns with two of them.
+#[derive(Default)]
+struct Turns {
+    /// Whether `other_blocks` was written last.
+    other: bool,
+}
+
+impl Turns {
+    fn take(&mut self, bindings: &mut [Bound]) {
+        let last = self.other;
+        for bound in bindings.iter_mut().filter(|bound| bound.resource == BLOCKS) {
+            let writes = bound.access.writes();
+            if writes != last {
+                bound.resource = OTHER_BLOCKS.to_owned();
+            }
+            self.other ^= writes;
+        }
     }
 }
 
@@ -315,9 +484,15 @@ fn plan_pass(template: &PassTemplate, settings: &Settings, sources: &Sources) ->
     let grid = match template.grid {
         GridTemplate::One => Grid::One,
         GridTemplate::Tiles => Grid::Tiles,
+        GridTemplate::BlockTiles => Grid::BlockTiles,
         GridTemplate::List(index) => Grid::Indirect { resource: "args".to_owned(), offset: index * ARGS_STRIDE },
     };
-    let pass = Pass { kernel: template.kernel.to_owned(), stage: template.stage, overrides, grid, bindings };
+    let name = if template.overrides.contains(&"ACCUMULATED") {
+        format!("{}_accumulated", template.kernel)
+    } else {
+        template.kernel.to_owned()
+    };
+    let pass = Pass { name, kernel: template.kernel.to_owned(), stage: template.stage, overrides, grid, bindings };
     Ok((pass, kernel))
 }
 
@@ -343,9 +518,14 @@ impl Plan {
         check_allocation(size)?;
         let mut passes = Vec::new();
         let mut kernels = Vec::new();
-        let is_needed = |template: &&PassTemplate| template.kernel != "prefilter" || settings.features.spatial_filter;
-        for template in PASSES.iter().filter(is_needed) {
-            let (pass, kernel) = plan_pass(template, settings, sources)?;
+        let templates: Vec<&PassTemplate> = match settings.pipeline {
+            Pipeline::Published => PASSES.iter().collect(),
+            Pipeline::Footprint => PASSES[..2].iter().chain(FOOTPRINT_PASSES).collect(),
+        };
+        let mut turns = Turns::default();
+        for template in templates.into_iter().filter(|template| (template.is_needed)(settings)) {
+            let (mut pass, kernel) = plan_pass(template, settings, sources)?;
+            turns.take(&mut pass.bindings);
             passes.push(pass);
             kernels.push(kernel);
         }
@@ -387,9 +567,10 @@ impl fmt::Display for Plan {
             let grid = match &pass.grid {
                 Grid::One => "one workgroup".to_owned(),
                 Grid::Tiles => "a workgroup per tile".to_owned(),
+                Grid::BlockTiles => "a workgroup per 8x8 blocks".to_owned(),
                 Grid::Indirect { resource, offset } => format!("indirect from {resource} + {offset}"),
             };
-            writeln!(f, "{} ({:?}), {grid}", pass.kernel, pass.stage)?;
+            writeln!(f, "{} ({:?}), {grid}", pass.name, pass.stage)?;
             for bound in &pass.bindings {
                 let arrow = match bound.access {
                     Access::Read => "<-",

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 /// Width and height of the tiles that work is skipped by, in pixels.
 pub const TILE_SIZE: u32 = 8;
 
+/// Width and height of the blocks that radiance is averaged over for wide filters, in pixels.
+pub const BLOCK_SIZE: u32 = 4;
+
 /// How a pass uses a resource.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "export", derive(schemars::JsonSchema))]
@@ -35,13 +38,19 @@ pub enum Format {
     Rgba16Float,
     /// Two 32-bit unsigned integers.
     Rg32Uint,
+    /// Four 32-bit unsigned integers.
+    Rgba32Uint,
+    /// A 32-bit unsigned integer.
+    R32Uint,
 }
 
 impl Format {
     /// Bytes of a texel.
     pub fn bytes(self) -> u64 {
         match self {
+            Self::R32Uint => 4,
             Self::Rgba16Float | Self::Rg32Uint => 8,
+            Self::Rgba32Uint => 16,
         }
     }
 
@@ -49,6 +58,8 @@ impl Format {
         match format {
             naga::StorageFormat::Rgba16Float => Some(Self::Rgba16Float),
             naga::StorageFormat::Rg32Uint => Some(Self::Rg32Uint),
+            naga::StorageFormat::Rgba32Uint => Some(Self::Rgba32Uint),
+            naga::StorageFormat::R32Uint => Some(Self::R32Uint),
             _ => None,
         }
     }
@@ -61,6 +72,8 @@ impl Format {
 pub enum Extent {
     /// One texel a pixel.
     Full,
+    /// One texel a 4x4 block, rounded up.
+    Block,
     /// One texel an 8x8 tile, rounded up.
     Tile,
 }
@@ -70,6 +83,7 @@ impl Extent {
     pub fn of(self, size: UVec2) -> UVec2 {
         match self {
             Self::Full => size,
+            Self::Block => (size + (BLOCK_SIZE - 1)) / BLOCK_SIZE,
             Self::Tile => (size + (TILE_SIZE - 1)) / TILE_SIZE,
         }
     }

@@ -10,22 +10,31 @@ use crate::Error;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Preset {
-    /// The recommendation: at present the published pipeline for surfaces of every roughness.
+    /// The recommendation, for surfaces of every roughness.
     Default,
+    /// The same with fewer taps, for tight budgets.
+    Fast,
     /// The pipeline that AMD published in 2021, with the constants it was published with, for a ray a pixel.
     Reference,
 }
 
 impl Preset {
     /// All presets, with the names that the command line uses.
-    pub const ALL: &[(&str, Preset)] = &[("default", Preset::Default), ("reference", Preset::Reference)];
+    pub const ALL: &[(&str, Preset)] =
+        &[("default", Preset::Default), ("fast", Preset::Fast), ("reference", Preset::Reference)];
 
     /// The settings that the preset stands for.
     pub fn settings(self) -> Settings {
         match self {
             Preset::Default => Settings::default(),
-            Preset::Reference => {
+            Preset::Fast => {
                 let mut settings = Settings::default();
+                settings.features.near_taps = 4;
+                settings.features.history_clip = false;
+                settings
+            }
+            Preset::Reference => {
+                let mut settings = Settings { pipeline: Pipeline::Published, ..Settings::default() };
                 // GGX alpha 0.2.
                 settings.coverage.roughness_threshold = 0.447_213_6;
                 settings
@@ -217,12 +226,23 @@ impl Default for Coverage {
 pub struct Number {
     /// Where in [`Settings`], such as `reproject.max_history`.
     pub path: &'static str,
-    /// Default, which is the published value.
+    /// Default; for constants of the published pipeline the published value.
     pub default: f32,
     /// Smallest value.
     pub low: f32,
     /// Largest value.
     pub high: f32,
+}
+
+/// Which passes denoise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pipeline {
+    /// Accumulates first, then filters over the footprint of the specular lobe: `docs/algorithm.md`.
+    #[default]
+    Footprint,
+    /// As AMD published it in 2021: `docs/reference.md`.
+    Published,
 }
 
 /// What is done at all. What is off leaves kernels, bindings, passes and memory; `docs/features.md` says what each
@@ -237,18 +257,30 @@ pub struct Features {
     /// Looks for history where the surface was. For rough and curved surfaces and moving objects. Without it there
     /// is no `motion` input, and no comparison with the neighbourhood's colour.
     pub surface_motion: bool,
-    /// Looks at the 3x3 places around history that does not fit well.
+    /// Published pipeline: looks at the 3x3 places around history that does not fit well.
     pub history_search: bool,
-    /// At edges takes those of four texels that show the same surface.
+    /// Published pipeline: at edges takes those of four texels that show the same surface.
     pub edge_repair: bool,
-    /// Blurs the noisy input before it is accumulated. A scene of mirrors has nothing to blur. Without it there is
-    /// no prefilter pass.
+    /// Filters over space. A scene of mirrors whose reflections hold no noise has nothing to filter. Without it the
+    /// published pipeline has no prefilter pass; the other keeps what was accumulated as it is.
     pub spatial_filter: bool,
-    /// Clips history, and new colour, to what the neighbourhood makes plausible. A scene in which neither light nor
-    /// objects move has nothing to clip. Without it what changes leaves trails.
+    /// Clips history to what the neighbourhood makes plausible; in the published pipeline of all surfaces, and new
+    /// colour too, else of smooth ones. A scene in which neither light nor objects move has nothing to clip. Without
+    /// it what changes leaves trails.
     pub history_clip: bool,
-    /// Mixes the 8x8 average into the colour where history is short. Less noise after disocclusion, less detail.
+    /// Published pipeline: mixes the 8x8 average into the colour where history is short. Less noise after
+    /// disocclusion, less detail.
     pub average_mixing: bool,
+    /// Footprint pipeline: forgets history where the light changed.
+    pub light_change: bool,
+    /// Footprint pipeline: cuts outliers off and spreads what was cut off, so that no energy is lost. An input without
+    /// fireflies needs none of it.
+    pub outlier_spread: bool,
+    /// Footprint pipeline: filters over blocks where the footprint is wider than a few pixels. A scene of smooth
+    /// surfaces has no such footprints.
+    pub wide_filter: bool,
+    /// Footprint pipeline: pixels that each is filtered with besides, 0 to 64.
+    pub near_taps: u32,
     /// Perceptual roughness, 0 to 1, where it is the same everywhere: then there is no `roughness` input.
     pub constant_roughness: Option<f32>,
 }
@@ -263,13 +295,17 @@ impl Default for Features {
             spatial_filter: true,
             history_clip: true,
             average_mixing: true,
+            light_change: true,
+            outlier_spread: true,
+            wide_filter: true,
+            near_taps: 12,
             constant_roughness: None,
         }
     }
 }
 
 impl Features {
-    /// Whether any pass uses the 8x8 averages.
+    /// Whether any pass of the published pipeline uses the 8x8 averages.
     pub(crate) fn uses_average(&self) -> bool {
         self.spatial_filter || self.history_clip || self.average_mixing
     }
@@ -279,6 +315,7 @@ impl Features {
             let reason = "without mirror_parallax and surface_motion there is no history to find";
             return Err(Error::Features { reason });
         }
+        check_range("features.near_taps", self.near_taps as f32, 0.0, 64.0, "0 to 64")?;
         if let Some(roughness) = self.constant_roughness {
             check_range("features.constant_roughness", roughness, 0.0, 1.0, "0 to 1")?;
         }
@@ -297,7 +334,7 @@ macro_rules! numeric_settings {
         #[non_exhaustive]
         pub struct $group {
             $($(#[$doc])*
-            #[doc = concat!("\n\nRange ", $low, " to ", $high, ", published value ", $default, ".")]
+            #[doc = concat!("\n\nRange ", $low, " to ", $high, ", default ", $default, ".")]
             pub $field: f32,)*
         }
 
@@ -401,6 +438,45 @@ numeric_settings! {
     }
 }
 
+numeric_settings! {
+    /// Constants of accumulation over time, for [`Pipeline::Footprint`]. Colours are exposed radiance.
+    Accumulate in "accumulate" {
+        /// Longest history on rough surfaces, in frames.
+        max_history = 31.0, 1.0 to 31.0;
+        /// Longest history on mirrors, in frames.
+        mirror_history = 8.0, 1.0 to 31.0;
+        /// Perceptual roughness below which history is clipped to the 3x3 pixels, and from which on it may be as long
+        /// as `max_history`.
+        clip_roughness = 0.15, 0.001 to 1.0;
+        /// Half size of what it is clipped to, in deviations of the 3x3 pixels.
+        clip_scale = 1.3, 0.0 to 1000.0;
+        /// A sample is an outlier beyond so many times the brightest other one of its 4x4 pixels.
+        outlier_factor = 6.0, 1.0 to 65504.0;
+        /// What was cut off from outliers comes back up to so many times the mean radiance around.
+        excess_limit = 8.0, 0.0 to 65504.0;
+        /// How long history may be where the surface's motion and the reflected point's lie one footprint apart, in
+        /// frames.
+        disagreement_limit = 0.4, 0.0 to 1000.0;
+        /// Standard errors of brightness by which light has to change for history to be forgotten.
+        light_change_sigma = 4.0, 0.1 to 1000.0;
+        /// Share of the brightness that it has to change by besides.
+        light_change_share = 0.15, 0.0 to 1000.0;
+    }
+}
+
+numeric_settings! {
+    /// Sizes of filters for [`Pipeline::Footprint`], in footprints of the specular lobe: GGX alpha times hit distance,
+    /// as the camera sees it.
+    Footprint in "footprint" {
+        /// Half axis of the filter of what was accumulated.
+        filter_scale = 0.6, 0.0 to 10.0;
+        /// Half axis over which the excess of outliers is spread.
+        excess_scale = 1.0, 0.0 to 10.0;
+        /// Least width at grazing angles, as a share of the length. 1 is round, less follows the lobe.
+        grazing_width = 0.5, 0.01 to 1.0;
+    }
+}
+
 /// Everything that can be chosen. `Default` is the recommendation.
 ///
 /// Settings can be read from TOML or JSON; whatever is not named keeps its default.
@@ -412,8 +488,14 @@ pub struct Settings {
     pub conventions: Conventions,
     /// Which pixels are denoised.
     pub coverage: Coverage,
+    /// Which passes denoise.
+    pub pipeline: Pipeline,
     /// What is done at all.
     pub features: Features,
+    /// Constants of accumulation.
+    pub accumulate: Accumulate,
+    /// Sizes of filters.
+    pub footprint: Footprint,
     /// Constants of the reproject pass.
     pub reproject: Reproject,
     /// Constants of the prefilter pass.
@@ -430,7 +512,9 @@ fn check_range(field: &'static str, value: f32, low: f32, high: f32, expected: &
 impl Settings {
     /// The constants of the passes, with their ranges.
     pub fn numbers() -> impl Iterator<Item = &'static Number> {
-        Reproject::NUMBERS.iter().chain(Prefilter::NUMBERS).chain(Resolve::NUMBERS)
+        let groups =
+            [Accumulate::NUMBERS, Footprint::NUMBERS, Reproject::NUMBERS, Prefilter::NUMBERS, Resolve::NUMBERS];
+        groups.into_iter().flatten()
     }
 
     /// Checks every number against its documented range.
@@ -440,6 +524,8 @@ impl Settings {
     /// [`Error::Setting`] for the first one outside.
     pub fn validate(&self) -> Result<(), Error> {
         self.features.validate()?;
+        self.accumulate.validate()?;
+        self.footprint.validate()?;
         self.reproject.validate()?;
         self.prefilter.validate()?;
         self.resolve.validate()?;

@@ -67,6 +67,7 @@ fn pass_of(stage: Stage, bindings: &[(usize, bool, Access)], indirect: Option<us
         access,
     });
     Pass {
+        name: String::new(),
         kernel: String::new(),
         stage,
         overrides: Default::default(),

@@ -7,6 +7,9 @@ struct Frame {
     world_from_pixel: mat4x4<f32>,
     // Homogeneous uv of last frame (x / w, y / w) of such a camera-relative position.
     prev_uv_from_world: mat4x4<f32>,
+    // Position relative to this frame's camera of (x w, y w, depth, 1) in last frame's pixels and depth, with
+    // w = prev_clip_w.x + prev_clip_w.y depth.
+    world_from_prev_pixel: mat4x4<f32>,
     // Columns that rotate a world direction into the axes of the environment map.
     environment_from_world: mat4x4<f32>,
     // linear depth = |(x + y d) / (z + w d)| of the depth d that the caller supplies.
@@ -16,6 +19,7 @@ struct Frame {
     // World-space direction the camera looks in; w is unused.
     forward: vec4<f32>,
     clip_w: vec2<f32>,
+    prev_clip_w: vec2<f32>,
     // Sky where the supplied depth is at or below x, or at or above y.
     sky_depth: vec2<f32>,
     motion_scale: vec2<f32>,
@@ -26,6 +30,10 @@ struct Frame {
     prev_size: vec2<u32>,
     exposure: f32,
     inverse_exposure: f32,
+    // Counts frames since the denoiser was made.
+    frame_index: u32,
+    // Pixels that a unit of length covers, at a depth of one unit where the camera has a perspective.
+    pixels_per_unit: f32,
 
     // Settings: see `limpid::Settings` for meaning, unit and range.
     roughness_threshold: f32,
@@ -58,6 +66,18 @@ struct Frame {
     clip_scale: f32,
     clip_average_pull: f32,
     clip_extent_floor: f32,
+    accumulate_max_history: f32,
+    accumulate_mirror_history: f32,
+    accumulate_clip_roughness: f32,
+    accumulate_clip_scale: f32,
+    outlier_factor: f32,
+    excess_limit: f32,
+    disagreement_limit: f32,
+    light_change_sigma: f32,
+    light_change_share: f32,
+    filter_scale: f32,
+    excess_scale: f32,
+    grazing_width: f32,
     // Steps per frame in which a history length is stored, a whole number.
     history_length_steps: f32,
     // Roughness of all surfaces, where it is the same for all.
@@ -71,11 +91,15 @@ fn pixel_uv(pixel: vec2<u32>) -> vec2<f32> {
     return (vec2<f32>(pixel) + 0.5) / vec2<f32>(frame.size);
 }
 
+// Camera-relative position at linear `depth` of a place on screen, in pixels.
+fn position_at(place: vec2<f32>, depth: f32) -> vec3<f32> {
+    let w = frame.clip_w.x + frame.clip_w.y * depth;
+    return (frame.world_from_pixel * vec4<f32>(place * w, depth, 1.0)).xyz;
+}
+
 // Camera-relative position of the surface that `pixel` shows at linear `depth`.
 fn world_position(pixel: vec2<u32>, depth: f32) -> vec3<f32> {
-    let w = frame.clip_w.x + frame.clip_w.y * depth;
-    let screen = (vec2<f32>(pixel) + 0.5) * w;
-    return (frame.world_from_pixel * vec4<f32>(screen, depth, 1.0)).xyz;
+    return position_at(vec2<f32>(pixel) + 0.5, depth);
 }
 
 // Unit direction from the camera to a camera-relative position; all parallel for an orthographic camera.

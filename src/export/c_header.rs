@@ -77,7 +77,7 @@ impl Export<'_> {
         let size = UVec2::new(16, 16);
         let view_to_clip = rh::proj::directx::perspective(1.0, 1.0, 0.1, 10.0);
         let camera = Camera { world_to_view: Mat4::IDENTITY, view_to_clip, jitter: Vec2::ZERO };
-        frame::constants(self.settings, &FrameInputs::new(camera, size), size, None)
+        frame::constants(self.settings, &FrameInputs::new(camera, size), size, None, 0)
     }
 
     fn settings_struct(&self) -> Result<String, Error> {
@@ -126,7 +126,7 @@ impl Export<'_> {
         let names: Vec<_> =
             self.plan.resources.iter().map(|r| format!("    LIMPID_RESOURCE_{},\n", upper(&r.name))).collect();
         let passes: Vec<_> =
-            self.plan.passes.iter().map(|p| format!("    LIMPID_PASS_{},\n", upper(&p.kernel))).collect();
+            self.plan.passes.iter().map(|p| format!("    LIMPID_PASS_{},\n", upper(&p.name))).collect();
         format!(
             "\n/* ---- The plan {} */\n\nenum {{\n{}    LIMPID_RESOURCE_COUNT\n}};\n\nenum {{\n{}    LIMPID_PASS_COUNT\n}};\n\n{}{}{}",
             "-".repeat(98),
@@ -152,7 +152,11 @@ impl Export<'_> {
                 Lifetime::Persistent => "PERSISTENT",
                 Lifetime::Transient => "TRANSIENT",
             };
-            let extent = if extent == Extent::Full { "FULL" } else { "TILE" };
+            let extent = match extent {
+                Extent::Full => "FULL",
+                Extent::Block => "BLOCK",
+                Extent::Tile => "TILE",
+            };
             format!(
                 "    {{\"{}\", LIMPID_{kind}, LIMPID_{lifetime}, LIMPID_EXTENT_{extent}, {}, \"{dxgi}\", {bytes}, {count}}},\n",
                 resource.name,
@@ -189,10 +193,11 @@ impl Export<'_> {
                     )
                 })
                 .collect();
-            let table = format!("limpid_{}_bindings", pass.kernel);
+            let table = format!("limpid_{}_bindings", pass.name);
             text += &format!("static const LimpidBinding {table}[{}] = {{\n{bindings}}};\n\n", pass.bindings.len());
             let (grid, resource, offset) = match &pass.grid {
                 Grid::One => ("ONE", "-1".to_owned(), 0),
+                Grid::BlockTiles => ("BLOCK_TILES", "-1".to_owned(), 0),
                 Grid::Tiles => ("TILES", "-1".to_owned(), 0),
                 Grid::Indirect { resource, offset } => {
                     ("INDIRECT", format!("LIMPID_RESOURCE_{}", upper(resource)), *offset)
@@ -201,7 +206,7 @@ impl Export<'_> {
             let stage = if pass.stage == Stage::Classify { "CLASSIFY" } else { "DENOISE" };
             rows += &format!(
                 "    {{\"{}\", LIMPID_STAGE_{stage}, LIMPID_GRID_{grid}, {resource}, {offset}, {}, {table}, {}}},\n",
-                pass.kernel,
+                pass.name,
                 u8::from(barrier.is_some()),
                 pass.bindings.len(),
             );

@@ -14,6 +14,7 @@ use crate::resource::{Access, Count, Extent, Kind, Lifetime, Resource, TILE_SIZE
 fn extent(extent: Extent) -> (&'static str, &'static str) {
     match extent {
         Extent::Full => ("width", "height"),
+        Extent::Block => ("(width + 3) / 4", "(height + 3) / 4"),
         Extent::Tile => ("(width + 7) / 8", "(height + 7) / 8"),
     }
 }
@@ -119,7 +120,7 @@ impl Export<'_> {
         let dependency = |d: crate::synchronization::Dependency| DependencyEntry {
             resource: d.resource,
             copy: d.copy,
-            pass: self.plan.passes[d.pass].kernel.clone(),
+            pass: self.plan.passes[d.pass].name.clone(),
             frames_ago: d.frames_ago,
             before: d.before,
             after: d.after,
@@ -127,12 +128,13 @@ impl Export<'_> {
         let targets = Target::ALL.iter().filter(|target| self.options.targets.contains(target));
         let is_hlsl = self.options.targets.contains(&Target::Hlsl);
         PassEntry {
-            name: pass.kernel.clone(),
+            name: pass.name.clone(),
             stage: pass.stage,
             overrides: pass.overrides.clone(),
             workgroup_size: kernel.workgroup_size,
             grid: match &pass.grid {
                 Grid::One => GridEntry::Direct { x: "1", y: "1", z: "1" },
+                Grid::BlockTiles => GridEntry::Direct { x: "(width + 31) / 32", y: "(height + 31) / 32", z: "1" },
                 Grid::Tiles => GridEntry::Direct { x: "(width + 7) / 8", y: "(height + 7) / 8", z: "1" },
                 Grid::Indirect { resource, offset } => {
                     GridEntry::Indirect { resource: resource.clone(), offset: *offset }
@@ -146,16 +148,16 @@ impl Export<'_> {
                 .collect(),
             barrier: self.plan.barriers()[index],
             dependencies: self.plan.dependencies()[index].iter().cloned().map(dependency).collect(),
-            shaders: targets.map(|&target| (target, self.shader_entry(target, kernel))).collect(),
+            shaders: targets.map(|&target| (target, self.shader_entry(target, pass, kernel))).collect(),
             root_signature: is_hlsl.then(|| self.options.hlsl.root_signature_of(kernel)),
         }
     }
 
-    fn shader_entry(&self, target: Target, kernel: &Kernel) -> Shader {
+    fn shader_entry(&self, target: Target, pass: &Pass, kernel: &Kernel) -> Shader {
         Shader {
-            file: self.path(target, kernel.name),
+            file: self.path(target, &pass.name),
             entry_point: if target == Target::Glsl { "main".to_owned() } else { kernel.name.to_owned() },
-            define: self.options.single_file.then(|| super::pass_macro(kernel.name)),
+            define: self.options.single_file.then(|| super::pass_macro(&pass.name)),
         }
     }
 
@@ -250,7 +252,9 @@ impl Usages {
                 unit: "image",
                 layout_entry: match format {
                     crate::resource::Format::Rgba16Float => "storageTexture: { format: 'rgba16float' }",
+                    crate::resource::Format::Rgba32Uint => "storageTexture: { format: 'rgba32uint' }",
                     crate::resource::Format::Rg32Uint => "storageTexture: { format: 'rg32uint' }",
+                    crate::resource::Format::R32Uint => "storageTexture: { format: 'r32uint' }",
                 },
             },
             BindingKind::StorageBuffer(Access::Read) => Self {

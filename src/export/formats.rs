@@ -29,6 +29,20 @@ pub(super) fn names(format: Format) -> FormatNames {
             webgpu: "rgba16float",
             gl: "GL_RGBA16F",
         },
+        Format::Rgba32Uint => FormatNames {
+            dxgi: "DXGI_FORMAT_R32G32B32A32_UINT",
+            vulkan: "VK_FORMAT_R32G32B32A32_UINT",
+            metal: "MTLPixelFormatRGBA32Uint",
+            webgpu: "rgba32uint",
+            gl: "GL_RGBA32UI",
+        },
+        Format::R32Uint => FormatNames {
+            dxgi: "DXGI_FORMAT_R32_UINT",
+            vulkan: "VK_FORMAT_R32_UINT",
+            metal: "MTLPixelFormatR32Uint",
+            webgpu: "r32uint",
+            gl: "GL_R32UI",
+        },
         Format::Rg32Uint => FormatNames {
             dxgi: "DXGI_FORMAT_R32G32_UINT",
             vulkan: "VK_FORMAT_R32G32_UINT",

@@ -243,30 +243,30 @@ impl<'a> Export<'a> {
     }
 
     /// Path of a pass's shader.
-    fn path(&self, target: Target, kernel: &str) -> String {
-        let name = if self.options.single_file { "limpid" } else { kernel };
+    fn path(&self, target: Target, pass: &str) -> String {
+        let name = if self.options.single_file { "limpid" } else { pass };
         format!("{}/{name}.{}", target.name(), target.ending())
     }
 
     fn shaders(&self, target: Target) -> Result<Vec<File>, Error> {
         let mut files = Vec::new();
         for (pass, kernel) in self.passes() {
-            files.push(File { path: self.path(target, kernel.name), bytes: self.shader(target, pass, kernel)? });
+            files.push(File { path: self.path(target, &pass.name), bytes: self.shader(target, pass, kernel)? });
         }
         if !self.options.single_file {
             return Ok(files);
         }
         let version = "#version 450\n";
         let mut text = if target == Target::Glsl { version.to_owned() } else { String::new() };
-        for (file, (_, kernel)) in files.iter().zip(self.passes()) {
-            let pass = String::from_utf8_lossy(&file.bytes).replacen(version, "", 1);
-            text += &format!("#ifdef {0}\n\n{pass}\n#endif // {0}\n\n", pass_macro(kernel.name));
+        for (file, (pass, _)) in files.iter().zip(self.passes()) {
+            let text_of_pass = String::from_utf8_lossy(&file.bytes).replacen(version, "", 1);
+            text += &format!("#ifdef {0}\n\n{text_of_pass}\n#endif // {0}\n\n", pass_macro(&pass.name));
         }
         Ok(vec![File::text(self.path(target, ""), text.trim_end().to_owned() + "\n")])
     }
 }
 
 /// The macro that chooses a pass of a single file.
-fn pass_macro(kernel: &str) -> String {
-    format!("LIMPID_{}", kernel.to_uppercase())
+fn pass_macro(pass: &str) -> String {
+    format!("LIMPID_{}", pass.to_uppercase())
 }

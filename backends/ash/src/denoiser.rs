@@ -464,7 +464,7 @@ impl Denoiser {
     /// [`Error::DeviceLost`] and others of Vulkan.
     pub fn read_times(&self) -> Result<Option<Vec<PassTime>>, Error> {
         let Some(timing) = self.timing.as_ref().filter(|_| self.frames > 0) else { return Ok(None) };
-        timing.read(self.slot(), self.core.plan().passes.iter().map(|pass| pass.kernel.as_str()))
+        timing.read(self.slot(), self.core.plan().passes.iter().map(|pass| pass.name.as_str()))
     }
 
     /// What was recorded for the last frame.

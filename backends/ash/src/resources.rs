@@ -186,7 +186,9 @@ impl Buffer {
 pub(crate) fn image_format(format: Format) -> vk::Format {
     match format {
         Format::Rgba16Float => vk::Format::R16G16B16A16_SFLOAT,
+        Format::Rgba32Uint => vk::Format::R32G32B32A32_UINT,
         Format::Rg32Uint => vk::Format::R32G32_UINT,
+        Format::R32Uint => vk::Format::R32_UINT,
     }
 }
 

@@ -72,7 +72,9 @@ pub struct Denoiser {
 fn texel_format(format: Format) -> TexelFormat {
     match format {
         Format::Rgba16Float => TexelFormat::Rgba16Float,
+        Format::Rgba32Uint => TexelFormat::Rgba32Uint,
         Format::Rg32Uint => TexelFormat::Rg32Uint,
+        Format::R32Uint => TexelFormat::R32Uint,
     }
 }
 

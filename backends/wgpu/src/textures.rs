@@ -20,7 +20,9 @@ pub(crate) struct Allocations(Vec<Allocation>);
 pub(crate) fn texture_format(format: Format) -> wgpu::TextureFormat {
     match format {
         Format::Rgba16Float => wgpu::TextureFormat::Rgba16Float,
+        Format::Rgba32Uint => wgpu::TextureFormat::Rgba32Uint,
         Format::Rg32Uint => wgpu::TextureFormat::Rg32Uint,
+        Format::R32Uint => wgpu::TextureFormat::R32Uint,
     }
 }
 

@@ -17,15 +17,15 @@ pub(crate) struct Cpu {
 }
 
 impl Cpu {
-    pub(crate) fn open(settings: &Settings, size: UVec2) -> Result<Self> {
-        let denoiser = Denoiser::new(settings, size)?;
+    pub(super) fn open(core: limpid::Denoiser) -> Result<Self> {
+        let denoiser = Denoiser::with_core(core)?;
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
         Ok(Self { description: format!("the CPU ({threads} threads, no driver)"), denoiser })
     }
 
     /// The same, watching what happens to numbers.
     pub(crate) fn open_probed(settings: &Settings, size: UVec2) -> Result<Self> {
-        let mut cpu = Self::open(settings, size)?;
+        let mut cpu = Self::open(limpid::Denoiser::new(settings, size)?)?;
         cpu.denoiser.probe();
         Ok(cpu)
     }

@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, anyhow};
 use glam::UVec2;
 use half::f16;
-use limpid::{FrameInputs, Plan, Settings};
+use limpid::{FrameInputs, Plan};
 use limpid_wgpu::{Denoiser, Inputs, Options, PassTime};
 
 use super::{Backend, Denoised, ListedRay, Tracer, split, timed, to_half, trace_listed};
@@ -111,11 +111,12 @@ impl Images {
 }
 
 impl Gpu {
-    pub(super) fn open(settings: &Settings, size: UVec2) -> Result<Self> {
+    pub(super) fn open(core: limpid::Denoiser) -> Result<Self> {
+        let size = core.plan().size;
         let (description, device, queue) = open_device()?;
         let timestamps = device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         let options = Options { timestamps, ..Default::default() };
-        let denoiser = Denoiser::new(&device, settings, size, options)?;
+        let denoiser = Denoiser::with_core(&device, core, options)?;
         let images = Images::new(&device, size);
         Ok(Self { description, device, queue, denoiser, images })
     }

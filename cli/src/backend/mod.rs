@@ -102,7 +102,7 @@ pub fn settle(choice: Choice) -> Choice {
     if choice != Choice::Auto {
         return choice;
     }
-    match gpu::Gpu::open(&Settings::default(), UVec2::ONE) {
+    match limpid::Denoiser::new(&Settings::default(), UVec2::ONE).map_err(Into::into).and_then(gpu::Gpu::open) {
         Ok(_) => Choice::Wgpu,
         Err(error) => {
             eprintln!("note: running on the CPU, because {error:#}");
@@ -129,17 +129,24 @@ pub fn open(choice: Choice, settings: &Settings, size: UVec2) -> Result<Box<dyn 
 ///
 /// As [`open`].
 pub fn open_encoded(choice: Choice, settings: &Settings, size: UVec2) -> Result<Box<dyn Backend>> {
-    // What limpid itself refuses, every backend would.
-    Plan::new(settings, size)?;
+    open_core(choice, limpid::Denoiser::new(settings, size)?)
+}
+
+/// Opens a backend that carries out a plan that is ready.
+///
+/// # Errors
+///
+/// When there is no device of the kind asked for.
+pub fn open_core(choice: Choice, core: limpid::Denoiser) -> Result<Box<dyn Backend>> {
     match choice {
-        Choice::Ash => Ok(Box::new(vulkan::Vulkan::open(settings, size)?)),
-        Choice::Wgpu => Ok(Box::new(gpu::Gpu::open(settings, size)?)),
-        Choice::Cpu => Ok(Box::new(cpu::Cpu::open(settings, size)?)),
-        Choice::Auto => match gpu::Gpu::open(settings, size) {
+        Choice::Ash => Ok(Box::new(vulkan::Vulkan::open(core)?)),
+        Choice::Wgpu => Ok(Box::new(gpu::Gpu::open(core)?)),
+        Choice::Cpu => Ok(Box::new(cpu::Cpu::open(core)?)),
+        Choice::Auto => match gpu::Gpu::open(core.clone()) {
             Ok(gpu) => Ok(Box::new(gpu)),
             Err(error) => {
                 eprintln!("note: running on the CPU, because {error:#}");
-                Ok(Box::new(cpu::Cpu::open(settings, size)?))
+                Ok(Box::new(cpu::Cpu::open(core)?))
             }
         },
     }

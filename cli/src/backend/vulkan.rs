@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::{Context as _, Result};
 use glam::UVec2;
 use half::f16;
-use limpid::{FrameInputs, Plan, Settings};
+use limpid::{FrameInputs, Plan};
 use limpid_ash::ash::vk::Format;
 use limpid_ash::offscreen::{Context, ContextOptions, Session, UploadedImage, UploadedInputs};
 use limpid_ash::{Denoiser, Options};
@@ -21,7 +21,7 @@ pub(super) struct Vulkan {
 }
 
 impl Vulkan {
-    pub(super) fn open(settings: &Settings, size: UVec2) -> Result<Self> {
+    pub(super) fn open(core: limpid::Denoiser) -> Result<Self> {
         let context = Rc::new(Context::open(&ContextOptions::default())?);
         let options = Options {
             synchronization: context.synchronization(),
@@ -29,7 +29,7 @@ impl Vulkan {
             ..Options::default()
         };
         let description = format!("{} through ash", context.name());
-        let session = Session::new(&context, limpid::Denoiser::new(settings, size)?, options)?;
+        let session = Session::new(&context, core, options)?;
         Ok(Self { description, session, context })
     }
 }

@@ -13,7 +13,7 @@ use crate::sequence::Frame;
 /// Time of a pass.
 #[derive(Debug, Serialize)]
 struct PassReport {
-    kernel: String,
+    name: String,
     /// Mean over the frames after the first, which also compiles, in milliseconds.
     milliseconds: Option<f64>,
 }
@@ -128,8 +128,8 @@ impl Recorder {
             cpu_milliseconds_per_frame: (self.timed_frames > 0).then(|| milliseconds(&self.total_cpu_time)),
             passes: passes
                 .map(|pass| PassReport {
-                    kernel: pass.kernel.clone(),
-                    milliseconds: self.pass_times.get(&pass.kernel).map(milliseconds),
+                    name: pass.name.clone(),
+                    milliseconds: self.pass_times.get(&pass.name).map(milliseconds),
                 })
                 .collect(),
             noisy: (!self.noisy.is_empty()).then(|| Scores::new(self.noisy)),
@@ -157,7 +157,7 @@ impl fmt::Display for Report {
         writeln!(f, "{bytes_per_pixel:.2} bytes per pixel, {dispatches_per_frame} dispatches per frame")?;
         for pass in &self.passes {
             if let Some(milliseconds) = pass.milliseconds {
-                writeln!(f, "  {:<18}{milliseconds:9.3} ms", pass.kernel)?;
+                writeln!(f, "  {:<18}{milliseconds:9.3} ms", pass.name)?;
             }
         }
         if let (Some(milliseconds), Some(cpu)) = (self.milliseconds_per_frame, self.cpu_milliseconds_per_frame) {

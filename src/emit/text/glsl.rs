@@ -156,8 +156,14 @@ impl Language for GlslOptions {
             BindingKind::StorageTexture(Format::Rgba16Float) => {
                 format!("layout({slot}, rgba16f) uniform writeonly image2D {name};\n")
             }
+            BindingKind::StorageTexture(Format::Rgba32Uint) => {
+                format!("layout({slot}, rgba32ui) uniform writeonly uimage2D {name};\n")
+            }
             BindingKind::StorageTexture(Format::Rg32Uint) => {
                 format!("layout({slot}, rg32ui) uniform writeonly uimage2D {name};\n")
+            }
+            BindingKind::StorageTexture(Format::R32Uint) => {
+                format!("layout({slot}, r32ui) uniform writeonly uimage2D {name};\n")
             }
             BindingKind::StorageBuffer(access) => {
                 let access = if access == Access::Read { "readonly " } else { "" };

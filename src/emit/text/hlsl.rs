@@ -100,7 +100,9 @@ impl HlslOptions {
         }
         let format = match binding.kind {
             BindingKind::StorageTexture(Format::Rgba16Float) => "[[vk::image_format(\"rgba16f\")]] ",
+            BindingKind::StorageTexture(Format::Rgba32Uint) => "[[vk::image_format(\"rgba32ui\")]] ",
             BindingKind::StorageTexture(Format::Rg32Uint) => "[[vk::image_format(\"rg32ui\")]] ",
+            BindingKind::StorageTexture(Format::R32Uint) => "[[vk::image_format(\"r32ui\")]] ",
             _ => "",
         };
         format!(
@@ -247,7 +249,9 @@ impl Language for HlslOptions {
             BindingKind::TextureFloat => "Texture2D<float4>".to_owned(),
             BindingKind::TextureUint => "Texture2D<uint4>".to_owned(),
             BindingKind::StorageTexture(Format::Rgba16Float) => "RWTexture2D<float4>".to_owned(),
+            BindingKind::StorageTexture(Format::Rgba32Uint) => "RWTexture2D<uint4>".to_owned(),
             BindingKind::StorageTexture(Format::Rg32Uint) => "RWTexture2D<uint2>".to_owned(),
+            BindingKind::StorageTexture(Format::R32Uint) => "RWTexture2D<uint>".to_owned(),
             BindingKind::StorageBuffer(Access::Read) => format!("StructuredBuffer<{element}>"),
             BindingKind::StorageBuffer(_) => format!("RWStructuredBuffer<{element}>"),
         };

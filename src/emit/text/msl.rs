@@ -106,7 +106,7 @@ impl Language for MslOptions {
             BindingKind::StorageTexture(format) => {
                 let ty = match format {
                     crate::resource::Format::Rgba16Float => "float",
-                    crate::resource::Format::Rg32Uint => "uint",
+                    _ => "uint",
                 };
                 format!("texture2d<{ty}, access::write> {name}")
             }

@@ -339,10 +339,11 @@ impl<'a> Writer<'a> {
         let ty = scope.info[coordinate].ty.inner_with(&self.module.types);
         let coordinate = super::language::Operand { text: self.expression(scope, coordinate)?, ty };
         let name = self.text(scope, image)?;
-        let text = if self.language.stores_full_values() || self.components(scope, image) == 4 {
+        let components = self.components(scope, image);
+        let text = if self.language.stores_full_values() || components == 4 {
             self.text(scope, value)?
         } else {
-            self.two_components(scope, value)?
+            self.first_components(scope, value, components)?
         };
         Ok(self.language.image_store(&name, &coordinate, &text))
     }
@@ -350,21 +351,26 @@ impl<'a> Writer<'a> {
     /// Components of a storage texture's format.
     fn components(&self, scope: &Scope, image: Handle<Expression>) -> u8 {
         match scope.info[image].ty.inner_with(&self.module.types) {
-            TypeInner::Image {
-                class: naga::ImageClass::Storage { format: naga::StorageFormat::Rg32Uint, .. }, ..
-            } => 2,
+            TypeInner::Image { class: naga::ImageClass::Storage { format, .. }, .. } => match format {
+                naga::StorageFormat::R32Uint => 1,
+                naga::StorageFormat::Rg32Uint => 2,
+                _ => 4,
+            },
             _ => 4,
         }
     }
 
-    /// The first two components of a vector of four.
-    fn two_components(&self, scope: &Scope, value: Handle<Expression>) -> Result<String> {
+    /// The first one or two components of a vector of four.
+    fn first_components(&self, scope: &Scope, value: Handle<Expression>, count: u8) -> Result<String> {
         if let Expression::Compose { components, .. } = &scope.function.expressions[value]
-            && let [first, _, _] = components[..]
+            && let Some(&first) = components.first()
+            // What is left is as long as what is cut off.
+            && components.len() == 5 - usize::from(count)
             && !scope.values.contains_key(&value)
         {
             return self.text(scope, first);
         }
-        Ok(format!("{}.xy", self.expression(scope, value)?.at_least(super::language::Binds::Whole)))
+        let swizzle = if count == 1 { "x" } else { "xy" };
+        Ok(format!("{}.{swizzle}", self.expression(scope, value)?.at_least(super::language::Binds::Whole)))
     }
 }

@@ -112,10 +112,15 @@ impl Language for WgslOptions {
             BindingKind::Uniform => ("<uniform>", element),
             BindingKind::TextureFloat => ("", "texture_2d<f32>".to_owned()),
             BindingKind::TextureUint => ("", "texture_2d<u32>".to_owned()),
-            BindingKind::StorageTexture(Format::Rgba16Float) => {
-                ("", "texture_storage_2d<rgba16float, write>".to_owned())
+            BindingKind::StorageTexture(format) => {
+                let format = match format {
+                    Format::Rgba16Float => "rgba16float",
+                    Format::Rgba32Uint => "rgba32uint",
+                    Format::Rg32Uint => "rg32uint",
+                    Format::R32Uint => "r32uint",
+                };
+                ("", format!("texture_storage_2d<{format}, write>"))
             }
-            BindingKind::StorageTexture(Format::Rg32Uint) => ("", "texture_storage_2d<rg32uint, write>".to_owned()),
             BindingKind::StorageBuffer(Access::Read) => ("<storage, read>", format!("array<{element}{}>", elements())),
             BindingKind::StorageBuffer(_) => ("<storage, read_write>", format!("array<{element}{}>", elements())),
         };

@@ -1,0 +1,296 @@
+//! Accumulate: finds history where the surface was and where what it reflects was, mixes both softly, and adds this
+//! frame's sample with the weight of one frame among many.
+//!
+//! in   radiance      any float    full    noisy input; a: hit distance
+//! in   motion        any float    full    uv motion of the surface (surface motion)
+//! in   guide         rg32uint     full    this frame's packed G-buffer
+//! in   prev_guide    rg32uint     full    last frame's
+//! in   history       rg32uint     full    last frame's `history`
+//! in   blocks        rgba32uint   block   statistics of the input, excess of outliers spread over the footprint
+//! in   samples       rg32uint     block   largest luminances (outlier spread)
+//! in   light         r32uint      block   whether the light changed (light change)
+//! in   tiles, args   lists                tiles to denoise
+//! out  history       rg32uint     full    accumulated radiance, its length, noise and hit share
+//!
+//! Grid: one 8x8 workgroup per listed tile (indirect). Loads 4 blocks, 8 guides, 8 histories, 9 radiances at most.
+//! After: accumulation as in Schied et al. 2017 (SVGF); reflected points after Lagarde and de Rousiers 2014 (dominant
+//! direction of the lobe). The two candidates are mixed by how well each fits the blocks of this frame; how far they
+//! lie apart, against the footprint, bounds what history is worth.
+
+import package::shared::frame;
+import package::shared::packing;
+import package::shared::radiance;
+import package::shared::outliers;
+import package::shared::tiles;
+import package::shared::footprint;
+import package::shared::history;
+import package::shared::blocks;
+
+// Looks for history where the reflected point was, seen in the surface.
+override MIRROR_PARALLAX: bool = true;
+// Looks for history where the surface was.
+override SURFACE_MOTION: bool = true;
+// Clips history of smooth surfaces to what the neighbourhood makes plausible.
+override HISTORY_CLIP: bool = true;
+// Forgets history where the light changed.
+override LIGHT_CHANGE: bool = true;
+// Cuts outliers off and adds what was cut off, spread.
+override OUTLIER_SPREAD: bool = true;
+
+@group(0) @binding(5) var in_motion: texture_2d<f32>;
+
+@group(1) @binding(0) var in_guide: texture_2d<u32>;
+@group(1) @binding(1) var in_prev_guide: texture_2d<u32>;
+@group(1) @binding(2) var in_history: texture_2d<u32>;
+@group(1) @binding(3) var in_blocks: texture_2d<u32>;
+@group(1) @binding(4) var in_samples: texture_2d<u32>;
+@group(1) @binding(5) var in_light: texture_2d<u32>;
+@group(1) @binding(6) var<storage, read> in_tiles: array<u32>;
+@group(1) @binding(7) var<storage, read> in_args: array<vec4<u32>, 3>;
+@group(1) @binding(8) var out_history: texture_storage_2d<rg32uint, write>;
+
+// Share of the blocks around a pixel that has to show its surface.
+const FIT: f32 = 0.2;
+// Roughness from and to which the surface's motion takes over from the reflected point's, and beyond which the
+// reflected point's alone is worth nothing.
+const SURFACE_FROM: f32 = 0.05;
+const SURFACE_TO: f32 = 0.4;
+const REFLECTION_UP_TO: f32 = 0.6;
+
+// What the blocks around a pixel say about its surface.
+struct Surroundings {
+    mean: vec3<f32>,
+    share: f32,
+    excess: vec3<f32>,
+    deviation: f32,
+    // How well they fit, 0 to 1.
+    fit: f32,
+}
+
+fn surroundings_of(pixel: vec2<u32>, plane: Plane) -> Surroundings {
+    var sum: Surroundings;
+    var weight = 1e-6;
+    for (var i = 0u; i < 4u; i++) {
+        let corner = corner_of(pixel, i);
+        let tap = unpack_block(textureLoad(in_blocks, corner.block, 0));
+        // The least weights are for pixels whose surface no block shows.
+        let fit = exp(-plane_penalty(plane, tap.guide, block_place(corner.block))) + 1e-5;
+        let w = select(0.0, (corner.weight + 1e-3) * fit, tap.guide.denoised);
+        sum.mean += tap.radiance * w;
+        sum.share += tap.share * w;
+        sum.excess += tap.excess * w;
+        sum.deviation += tap.deviation * w;
+        weight += w;
+    }
+    let normalization = 1.0 / weight;
+    sum.mean *= normalization;
+    sum.share *= normalization;
+    sum.excess *= normalization;
+    sum.deviation *= normalization;
+    sum.fit = smoothstep(0.0, FIT, weight);
+    return sum;
+}
+
+// The sample of this frame, exposed, without what makes it an outlier.
+fn sample_of(pixel: vec2<u32>, guide: Guide, around: Surroundings) -> vec3<f32> {
+    let radiance = load_radiance(pixel);
+    if OUTLIER_SPREAD {
+        let peaks = unpack2x16float(textureLoad(in_samples, pixel / BLOCK_SIZE, 0).x);
+        let kept = without_outlier(radiance, peaks, guide.roughness);
+        // Very rare samples would come back as blotches.
+        let returned = min(1.0, frame.excess_limit * luminance(around.mean) / luminance(around.excess));
+        let excess = around.excess * (returned * around.fit);
+        return kept + select(excess, vec3<f32>(0.0), guide.roughness < OUTLIER_ROUGHNESS);
+    }
+    return radiance;
+}
+
+// What last frame had at some place.
+struct Found {
+    radiance: vec3<f32>,
+    length: f32,
+    share: f32,
+    is_valid: bool,
+}
+
+fn nothing_found() -> Found {
+    return Found(vec3<f32>(0.0), 0.0, 0.0, false);
+}
+
+fn mix_found(a: Found, b: Found, t: f32) -> Found {
+    return Found(mix(a.radiance, b.radiance, t), mix(a.length, b.length, t), mix(a.share, b.share, t), true);
+}
+
+// How far a tap may be from the surface it is history of.
+struct Tolerance {
+    // Distance from its plane, as a share of depth.
+    plane: f32,
+    // Least cosine between normals.
+    cosine: f32,
+}
+
+// Blends those of four texels that show the surface. The plane test is done in world space, so that a camera that
+// moves forward does not fail it.
+fn history_at(prev_uv: vec2<f32>, guide: Guide, position: vec3<f32>, share: f32, tolerance: Tolerance) -> Found {
+    let size = vec2<f32>(frame.prev_size);
+    let place = prev_uv * size;
+    if !(all(place > vec2<f32>(0.0)) && all(place < size)) {
+        return nothing_found();
+    }
+    let base = floor(place - 0.5);
+    let fraction = place - 0.5 - base;
+    let last = vec2<i32>(frame.prev_size) - 1;
+    var radiance = vec3<f32>(0.0);
+    var length_and_share = vec2<f32>(0.0);
+    var weight = 0.0;
+    for (var i = 0u; i < 4u; i++) {
+        let offset = vec2<u32>(i & 1u, i >> 1u);
+        let texel = clamp(vec2<i32>(base) + vec2<i32>(offset), vec2<i32>(0), last);
+        let tap = unpack_guide(textureLoad(in_prev_guide, texel, 0).xy);
+        let history = unpack_history(textureLoad(in_history, texel, 0).xy);
+        let from_plane = dot(guide.normal, prev_world_position(texel, tap.depth) - position);
+        let is_same = tap.denoised
+            && abs(from_plane) < tolerance.plane * guide.depth
+            && dot(tap.normal, guide.normal) > tolerance.cosine
+            && abs(tap.roughness - guide.roughness) <= 0.5 * guide.roughness + 0.15
+            && abs(history.share - share) < 0.08 + 4.0 * guide.roughness
+            && history.length > 0.0;
+        let bilinear = select(1.0 - fraction, fraction, offset == vec2<u32>(1u));
+        let w = select(0.0, bilinear.x * bilinear.y, is_same);
+        radiance += select(vec3<f32>(0.0), history.radiance, is_same) * w;
+        length_and_share += vec2<f32>(history.length, history.share) * w;
+        weight += w;
+    }
+    if weight < 0.02 {
+        return nothing_found();
+    }
+    let normalization = 1.0 / weight;
+    let exposed = min(radiance * (normalization * frame.exposure), vec3<f32>(HALF_MAX));
+    return Found(exposed, length_and_share.x * normalization, length_and_share.y * normalization, true);
+}
+
+fn squeezed(c: vec3<f32>) -> vec3<f32> {
+    return c / (1.0 + c);
+}
+
+// Distance of history from what the blocks show, in their deviations.
+fn misfit(history: vec3<f32>, around: Surroundings) -> f32 {
+    let d = abs(squeezed(history) - squeezed(around.mean));
+    return (d.x + d.y + d.z) / (around.deviation + 0.02);
+}
+
+// Moves history towards the mean of the 3x3 pixels where it is beyond their deviation.
+fn clipped(history: vec3<f32>, pixel: vec2<u32>) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    var squares = vec3<f32>(0.0);
+    for (var i = 0; i < 9; i++) {
+        let at = clamp(vec2<i32>(pixel) + vec2<i32>(i % 3, i / 3) - 1, vec2<i32>(0), vec2<i32>(frame.size) - 1);
+        let c = squeezed(load_radiance(vec2<u32>(at)));
+        sum += c;
+        squares += c * c;
+    }
+    let mean = sum * (1.0 / 9.0);
+    let variance = max(squares * (1.0 / 9.0) - mean * mean, vec3<f32>(0.0));
+    let extent = sqrt(variance) * frame.accumulate_clip_scale + 0.02;
+    let c = clamp(squeezed(history), max(mean - extent, vec3<f32>(0.0)), min(mean + extent, vec3<f32>(0.9999)));
+    return c / (1.0 - c);
+}
+
+// Where the surface was.
+fn surface_prev_uv(pixel: vec2<u32>) -> vec2<f32> {
+    let motion = textureLoad(in_motion, pixel, 0).xy * frame.motion_scale + frame.motion_offset;
+    let uv = pixel_uv(pixel) - motion;
+    let usable = is_finite(uv.x) && is_finite(uv.y);
+    return select(vec2<f32>(-4.0), clamp(uv, vec2<f32>(-4.0), vec2<f32>(4.0)), usable);
+}
+
+// History by both motions, its length bounded by what it is worth.
+fn find_history(pixel: vec2<u32>, guide: Guide, position: vec3<f32>, share: f32, around: Surroundings) -> Found {
+    let r = guide.roughness;
+    let size = vec2<f32>(frame.size);
+    let static_uv = prev_uv_of(position);
+    var cap = mix(frame.accumulate_mirror_history, frame.accumulate_max_history, smoothstep(0.0, frame.accumulate_clip_roughness, r));
+    var surface_uv = static_uv;
+    var surface = nothing_found();
+    // Where it is not where the camera's motion alone would put it, something else moved the surface.
+    var moves = false;
+    if SURFACE_MOTION {
+        surface_uv = surface_prev_uv(pixel);
+        moves = length((surface_uv - static_uv) * size) > 0.5;
+        let tolerance = Tolerance(select(0.01, 0.1, moves), select(0.9, 0.7, moves));
+        surface = history_at(surface_uv, guide, position, share, tolerance);
+    }
+    var found = surface;
+    if MIRROR_PARALLAX {
+        let alpha = alpha_of(r);
+        // The lobe's dominant direction is nearer to the normal the rougher the surface is.
+        let dominant = (1.0 - alpha) * (sqrt(1.0 - alpha) + alpha);
+        let distance = hit_distance_of(share, camera_distance_of(position)) * dominant;
+        let reflection_uv = prev_uv_of(position + view_direction(position) * distance) + (surface_uv - static_uv);
+        let tolerance = Tolerance(select(0.015, 0.1, moves), select(0.98, 0.95, r >= 0.3));
+        let reflection = history_at(reflection_uv, guide, position, share, tolerance);
+        let apart = max(length((reflection_uv - surface_uv) * size), 1e-3);
+        let radius = lobe_footprint(position, guide, share).along;
+        if surface.is_valid {
+            if reflection.is_valid {
+                let difference = clamp(misfit(reflection.radiance, around) - misfit(surface.radiance, around), -8.0, 8.0);
+                let favour = min(1.0, 2.0 / (1.0 + exp(difference)));
+                found = mix_found(surface, reflection, favour * (1.0 - smoothstep(SURFACE_FROM, SURFACE_TO, r)));
+                cap = min(cap, 1.0 + frame.disagreement_limit * (radius + 1.0) / apart);
+            } else {
+                cap = min(cap, (radius + 0.5) / apart);
+            }
+        } else {
+            found = reflection;
+            found.is_valid = reflection.is_valid && r < REFLECTION_UP_TO;
+        }
+    }
+    found.length = select(0.0, min(found.length, cap), found.is_valid);
+    return found;
+}
+
+fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
+    let position = world_position(pixel, guide.depth);
+    let around = surroundings_of(pixel, plane_of(guide, position));
+    let radiance = sample_of(pixel, guide, around);
+    let distance = usable_hit_distance(textureLoad(in_radiance, pixel, 0).a);
+    let own_share = select(around.share, hit_share(distance, camera_distance_of(position)), distance > 0.0);
+    // Single hit distances of rough surfaces say little, and go with the colour of their sample.
+    let share = mix(own_share, around.share, smoothstep(0.03, 0.2, guide.roughness) * around.fit);
+
+    var found = find_history(pixel, guide, position, share, around);
+    if LIGHT_CHANGE {
+        let changed = unpack2x16float(textureLoad(in_light, pixel / BLOCK_SIZE, 0).x).y;
+        found.length *= 1.0 - changed * smoothstep(0.05, 0.2, guide.roughness);
+    }
+    if HISTORY_CLIP {
+        found.radiance = select(found.radiance, clipped(found.radiance, pixel), guide.roughness < frame.accumulate_clip_roughness);
+    }
+    let rate = 1.0 / (found.length + 1.0);
+    let residual = brightness(radiance) - brightness(found.radiance);
+    var history: History;
+    history.radiance = mix(found.radiance, radiance, rate) * frame.inverse_exposure;
+    history.length = found.length + 1.0;
+    history.share = select(share, mix(found.share, share, max(rate, 0.1)), found.length > 0.0);
+    // The residual has the variance of the sample and of the history; what is left of both after mixing.
+    history.noise = select(-1.0, residual * residual * found.length * rate * rate, found.length >= 0.5);
+    return history;
+}
+
+@compute @workgroup_size(8, 8)
+fn accumulate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let index = list_index(group);
+    if index >= in_args[0].w {
+        return;
+    }
+    let pixel = unpack_tile(in_tiles[index]) * TILE_SIZE + lane_position(lane);
+    if any(pixel >= frame.size) {
+        return;
+    }
+    let guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
+    var history = History(vec3<f32>(0.0), 0.0, 0.0, -1.0);
+    if guide.denoised {
+        history = accumulated(pixel, guide);
+    }
+    textureStore(out_history, pixel, vec4<u32>(pack_history(history), 0u, 0u));
+}

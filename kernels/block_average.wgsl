@@ -1,0 +1,143 @@
+//! Block average: averages radiance over the part of each 4x4 block that shows one surface.
+//!
+//! in   guide      rg32uint      full    packed G-buffer
+//! in   radiance   any float     full    noisy input; a: hit distance (not when ACCUMULATED)
+//! in   history    rg32uint      full    this frame's accumulated radiance (when ACCUMULATED)
+//! out  blocks     rgba32uint    block   surface, mean radiance, hit share; what was cut off from outliers
+//! out  samples    rg32uint      block   largest luminances, moments of brightness (not when ACCUMULATED)
+//!
+//! Grid: one invocation a block, 8x8 of them a workgroup. Each pixel is read twice.
+//! After: outliers are set aside, not lost, as in DeCoro et al. 2010; here their excess is spread by `block_spread`
+//! and comes back in `accumulate`.
+
+import package::shared::frame;
+import package::shared::packing;
+import package::shared::radiance;
+import package::shared::outliers;
+import package::shared::footprint;
+import package::shared::history;
+import package::shared::blocks;
+
+// Averages what was accumulated, not the input.
+override ACCUMULATED: bool = false;
+// Cuts outliers off.
+override OUTLIER_SPREAD: bool = true;
+// Some later pass uses `samples`.
+override SAMPLES_ARE_USED: bool = false;
+
+@group(1) @binding(0) var in_guide: texture_2d<u32>;
+@group(1) @binding(1) var in_history: texture_2d<u32>;
+@group(1) @binding(2) var out_blocks: texture_storage_2d<rgba32uint, write>;
+@group(1) @binding(3) var out_samples: texture_storage_2d<rg32uint, write>;
+
+// What stands for a block.
+struct Choice {
+    guide: Guide,
+    pixel: vec2<u32>,
+    // Largest luminance of its samples and the next.
+    peaks: vec2<f32>,
+}
+
+fn block_pixel(corner: vec2<u32>, index: u32) -> vec2<u32> {
+    return corner + vec2<u32>(index & 3u, index >> 2u);
+}
+
+// Off screen nothing is denoised.
+fn guide_at(pixel: vec2<u32>) -> Guide {
+    let inside = min(pixel, frame.size - 1u);
+    var guide = unpack_guide(textureLoad(in_guide, inside, 0).xy);
+    guide.denoised = guide.denoised && all(pixel == inside);
+    return guide;
+}
+
+// The denoised pixel nearest to the centre of a block.
+fn choose(corner: vec2<u32>) -> Choice {
+    var choice: Choice;
+    var nearest = 1e9;
+    var count = 0u;
+    for (var i = 0u; i < 16u; i++) {
+        let pixel = block_pixel(corner, i);
+        let guide = guide_at(pixel);
+        // A little off the centre, so that no two are as near.
+        let offset = vec2<f32>(pixel - corner) - vec2<f32>(1.4, 1.45);
+        let distance = dot(offset, offset);
+        if guide.denoised && distance < nearest {
+            nearest = distance;
+            choice.guide = guide;
+            choice.pixel = pixel;
+        }
+        count += select(0u, 1u, guide.denoised);
+        if !ACCUMULATED {
+            let l = select(0.0, luminance(load_radiance(min(pixel, frame.size - 1u))), guide.denoised);
+            choice.peaks = vec2<f32>(max(choice.peaks.x, l), max(choice.peaks.y, min(choice.peaks.x, l)));
+        }
+    }
+    // A sample on its own is above no other.
+    choice.peaks.y = select(choice.peaks.y, choice.peaks.x, count < 2u);
+    return choice;
+}
+
+@compute @workgroup_size(8, 8)
+fn block_average(@builtin(global_invocation_id) id: vec3<u32>) {
+    if any(vec2<i32>(id.xy) > last_block()) {
+        return;
+    }
+    let corner = id.xy * BLOCK_SIZE;
+    let choice = choose(corner);
+    if !choice.guide.denoised {
+        textureStore(out_blocks, id.xy, vec4<u32>(0u));
+        return;
+    }
+    let position = world_position(choice.pixel, choice.guide.depth);
+    let camera_distance = camera_distance_of(position);
+    let plane = plane_of(choice.guide, position);
+    // a: weight.
+    var radiance = vec4<f32>(0.0);
+    var excess = vec3<f32>(0.0);
+    // x: weighted sum, y: weight of those that know.
+    var share = vec2<f32>(0.0);
+    var noise = vec2<f32>(0.0);
+    var moments = vec2<f32>(0.0);
+    for (var i = 0u; i < 16u; i++) {
+        let guide = guide_at(block_pixel(corner, i));
+        let pixel = min(block_pixel(corner, i), frame.size - 1u);
+        let w = select(0.0, exp(-plane_penalty(plane, guide, vec2<f32>(pixel) + 0.5)), guide.denoised);
+        var c = vec3<f32>(0.0);
+        if ACCUMULATED {
+            let history = unpack_history(textureLoad(in_history, pixel, 0).xy);
+            c = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
+            share += select(vec2<f32>(0.0), vec2<f32>(history.share, 1.0) * w, guide.denoised);
+            noise += select(vec2<f32>(0.0), vec2<f32>(history.noise, 1.0) * w, guide.denoised && history.noise >= 0.0);
+        } else {
+            c = load_radiance(pixel);
+            let distance = usable_hit_distance(textureLoad(in_radiance, pixel, 0).a);
+            share += select(vec2<f32>(0.0), vec2<f32>(hit_share(distance, camera_distance), 1.0) * w, distance > 0.0);
+            if OUTLIER_SPREAD {
+                let kept = without_outlier(c, choice.peaks, choice.guide.roughness);
+                excess += select(vec3<f32>(0.0), (c - kept) * w, guide.denoised);
+                c = kept;
+            }
+        }
+        c = select(vec3<f32>(0.0), c, guide.denoised);
+        radiance += vec4<f32>(c, 1.0) * w;
+        let b = brightness(c);
+        moments += vec2<f32>(b, b * b) * w;
+    }
+    let normalization = 1.0 / max(radiance.w, 1e-6);
+    moments *= normalization;
+    var block: Block;
+    block.guide = choice.guide;
+    block.radiance = radiance.rgb * normalization;
+    block.excess = excess * normalization;
+    block.share = select(0.5, share.x / max(share.y, 1e-6), share.y > 0.0);
+    if ACCUMULATED {
+        // Variance over time where most pixels know it, else variance over the block.
+        let spatial = max(moments.y - moments.x * moments.x, 0.0);
+        block.deviation = sqrt(mix(spatial, noise.x / max(noise.y, 1e-6), smoothstep(0.0, 0.5, noise.y * normalization)));
+    }
+    if SAMPLES_ARE_USED {
+        let peaks = min(choice.peaks, vec2<f32>(HALF_MAX));
+        textureStore(out_samples, id.xy, vec4<u32>(pack2x16float(peaks), pack2x16float(moments), 0u, 0u));
+    }
+    textureStore(out_blocks, id.xy, pack_block(block));
+}

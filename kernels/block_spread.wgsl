@@ -1,0 +1,73 @@
+//! Block spread: filters blocks over the footprint of the lobe.
+//!
+//! in   blocks   rgba32uint   block   of the input, or of what was accumulated
+//! out  blocks   rgba32uint   block   with its excess, or its radiance, filtered
+//!
+//! Grid: one invocation a block, 8x8 of them a workgroup. 25 taps on a grid that stretches with the footprint.
+
+import package::shared::frame;
+import package::shared::packing;
+import package::shared::footprint;
+import package::shared::blocks;
+
+// Filters the radiance that was accumulated, not the excess of the input.
+override ACCUMULATED: bool = false;
+
+@group(1) @binding(0) var in_blocks: texture_2d<u32>;
+@group(1) @binding(1) var out_blocks: texture_storage_2d<rgba32uint, write>;
+
+// Distance between taps, in half axes of the footprint.
+const SPACING: f32 = 0.5;
+// Hit shares further apart belong to different things.
+const SHARE_TOLERANCE: f32 = 0.3;
+
+@compute @workgroup_size(8, 8)
+fn block_spread(@builtin(global_invocation_id) id: vec3<u32>) {
+    let last = last_block();
+    let center = vec2<i32>(id.xy);
+    if any(center > last) {
+        return;
+    }
+    let texel = textureLoad(in_blocks, center, 0);
+    var block = unpack_block(texel);
+    if !block.guide.denoised {
+        textureStore(out_blocks, center, texel);
+        return;
+    }
+    let position = position_at(block_place(center), block.guide.depth);
+    let plane = plane_of(block.guide, position);
+    let footprint = lobe_footprint(position, block.guide, block.share);
+    var scale = frame.excess_scale;
+    if ACCUMULATED {
+        scale = frame.filter_scale;
+    }
+    // In blocks.
+    let radius = max(vec2<f32>(footprint.along, footprint.across) * (scale / f32(BLOCK_SIZE)), vec2<f32>(0.5));
+    let side = side_of(footprint.axis);
+    let step = max(radius * SPACING, vec2<f32>(1.0));
+    // rgb: radiance or excess; a: weight.
+    var sum = vec4<f32>(0.0);
+    for (var i = 0; i < 25; i++) {
+        let grid = vec2<f32>(vec2<i32>(i % 5, i / 5) - 2);
+        let offset = round(footprint.axis * (grid.x * step.x) + side * (grid.y * step.y));
+        let at = clamp(center + vec2<i32>(offset), vec2<i32>(0), last);
+        let tap = unpack_block(textureLoad(in_blocks, at, 0));
+        let rho = vec2<f32>(dot(offset, footprint.axis), dot(offset, side)) / radius;
+        let penalty = plane_penalty(plane, tap.guide, block_place(at));
+        let fits = tap.guide.denoised && all(at == center + vec2<i32>(offset));
+        if ACCUMULATED {
+            let apart = (tap.share - block.share) / SHARE_TOLERANCE;
+            sum += vec4<f32>(tap.radiance, 1.0) * select(0.0, exp(-penalty - apart * apart - 1.2 * dot(rho, rho)), fits);
+        } else {
+            sum += vec4<f32>(tap.excess, 1.0) * select(0.0, exp(-penalty - 0.6 * dot(rho, rho)), fits);
+        }
+    }
+    let mean = sum.rgb / max(sum.w, 1e-6);
+    if ACCUMULATED {
+        block.radiance = mean;
+    } else {
+        // Where the footprint is smaller than a pixel there is nothing to spread over.
+        block.excess = select(mean, vec3<f32>(0.0), footprint.along < 0.5);
+    }
+    textureStore(out_blocks, center, pack_block(block));
+}

@@ -1,0 +1,116 @@
+//! Block statistics: smooths blocks over their neighbours, and notices where the light changed.
+//!
+//! in   blocks       rgba32uint    block   of the input
+//! in   samples      rg32uint      block   moments of brightness
+//! in   motion       any float     full    uv motion of the surface (light change, surface motion)
+//! in   prev_light   r32uint       block   last frame's `light`
+//! out  blocks       rgba32uint    block   mean over 3x3 blocks, deviation between them
+//! out  light        r32uint       block   typical brightness of a sample over time, and whether it changed
+//!
+//! Grid: one invocation a block, 8x8 of them a workgroup. 9 taps.
+//! What is compared over time is the mean of squeezed brightness, not of radiance: single bright samples, which come
+//! and go, hardly move it, and what all samples agree on does.
+
+import package::shared::frame;
+import package::shared::packing;
+import package::shared::footprint;
+import package::shared::history;
+import package::shared::blocks;
+
+// Notices where the light changed.
+override LIGHT_CHANGE: bool = true;
+// The motion of surfaces is known.
+override SURFACE_MOTION: bool = true;
+
+@group(0) @binding(5) var in_motion: texture_2d<f32>;
+
+@group(1) @binding(0) var in_blocks: texture_2d<u32>;
+@group(1) @binding(1) var in_samples: texture_2d<u32>;
+@group(1) @binding(2) var in_prev_light: texture_2d<u32>;
+@group(1) @binding(3) var out_blocks: texture_storage_2d<rgba32uint, write>;
+@group(1) @binding(4) var out_light: texture_storage_2d<r32uint, write>;
+
+// A change counts beyond this, standard errors and a share of the brightness.
+const LIGHT_FLOOR: f32 = 0.01;
+// Share of this frame in the typical brightness.
+const LIGHT_RATE: f32 = 0.15;
+
+// Brightness that last frames had typically, where the surface was; 0 where it is not known.
+fn known_brightness(block: vec2<i32>, position: vec3<f32>) -> f32 {
+    var prev_uv = vec2<f32>(0.0);
+    if SURFACE_MOTION {
+        let pixel = vec2<u32>(block_place(block));
+        let motion = textureLoad(in_motion, pixel, 0).xy * frame.motion_scale + frame.motion_offset;
+        prev_uv = pixel_uv(pixel) - motion;
+    } else {
+        prev_uv = prev_uv_of(position);
+    }
+    let place = prev_uv * vec2<f32>(frame.prev_size);
+    // Not a number fails the comparison.
+    let on_screen = all(place >= vec2<f32>(0.0)) && all(place < vec2<f32>(frame.prev_size));
+    let prev_block = vec2<i32>(select(vec2<f32>(0.0), place, on_screen)) / i32(BLOCK_SIZE);
+    return select(0.0, unpack2x16float(textureLoad(in_prev_light, prev_block, 0).x).x, on_screen);
+}
+
+@compute @workgroup_size(8, 8)
+fn block_statistics(@builtin(global_invocation_id) id: vec3<u32>) {
+    let last = last_block();
+    let center = vec2<i32>(id.xy);
+    if any(center > last) {
+        return;
+    }
+    var block = unpack_block(textureLoad(in_blocks, center, 0));
+    if !block.guide.denoised {
+        textureStore(out_blocks, center, vec4<u32>(0u));
+        if LIGHT_CHANGE {
+            textureStore(out_light, center, vec4<u32>(0u));
+        }
+        return;
+    }
+    let position = position_at(block_place(center), block.guide.depth);
+    let plane = plane_of(block.guide, position);
+    // a: weight.
+    var radiance = vec4<f32>(0.0);
+    var excess = vec3<f32>(0.0);
+    var share = 0.0;
+    // Of blocks, and of samples.
+    var moments = vec2<f32>(0.0);
+    var sample_moments = vec2<f32>(0.0);
+    var squared_weight = 0.0;
+    for (var i = 0; i < 9; i++) {
+        let offset = vec2<i32>(i % 3, i / 3) - 1;
+        let at = clamp(center + offset, vec2<i32>(0), last);
+        let tap = unpack_block(textureLoad(in_blocks, at, 0));
+        let penalty = plane_penalty(plane, tap.guide, block_place(at)) + 0.4 * f32(dot(offset, offset));
+        let w = select(0.0, exp(-penalty), tap.guide.denoised && all(at == center + offset));
+        radiance += vec4<f32>(tap.radiance, 1.0) * w;
+        excess += tap.excess * w;
+        share += tap.share * w;
+        let b = brightness(tap.radiance);
+        moments += vec2<f32>(b, b * b) * w;
+        if LIGHT_CHANGE {
+            sample_moments += unpack2x16float(textureLoad(in_samples, at, 0).y) * w;
+            squared_weight += w * w;
+        }
+    }
+    let normalization = 1.0 / max(radiance.w, 1e-6);
+    moments *= normalization;
+    block.radiance = radiance.rgb * normalization;
+    block.excess = excess * normalization;
+    block.share = share * normalization;
+    block.deviation = sqrt(max(moments.y - moments.x * moments.x, 0.0));
+    textureStore(out_blocks, center, pack_block(block));
+
+    if LIGHT_CHANGE {
+        sample_moments *= normalization;
+        // Of a weighted mean of blocks of 16 samples.
+        let variance = max(sample_moments.y - sample_moments.x * sample_moments.x, 0.0)
+            * (squared_weight * normalization * normalization / 16.0);
+        let typical = sample_moments.x;
+        let known = known_brightness(center, position);
+        let tolerance = frame.light_change_sigma * sqrt(variance) + frame.light_change_share * known + LIGHT_FLOOR;
+        let changed = select(0.0, smoothstep(1.0, 2.0, abs(typical - known) / tolerance), known > 0.0);
+        let kept = select(typical, mix(known, typical, max(LIGHT_RATE, changed)), known > 0.0);
+        textureStore(out_light, center, vec4<u32>(pack2x16float(vec2<f32>(kept, changed)), 0u, 0u, 0u));
+    }
+}

@@ -1,0 +1,151 @@
+//! Lobe filter: smooths accumulated radiance over the footprint of the specular lobe: the blocks around a pixel where
+//! the footprint is wide, a few pixels where it is narrow, and for mirrors those that differ by noise alone.
+//!
+//! in   history       rg32uint      full    this frame's accumulated radiance
+//! in   guide         rg32uint      full    packed G-buffer
+//! in   blocks        rgba32uint    block   accumulated radiance filtered over the footprint, its deviation
+//! in   tiles, args   lists                 tiles to denoise
+//! in   radiance      any float     full    input fallback
+//! out  output        rgba16float   full    rgb: denoised radiance; a: variance of its brightness, 0..1
+//!
+//! Grid: one 8x8 workgroup per listed tile (indirect). Loads 4 blocks, and a history and a guide for each near tap.
+//! Weights depend on the surface, on hit distance and on how settled a tap is; on colour for mirrors only: elsewhere
+//! that would darken, as bright samples are rare.
+
+import package::shared::frame;
+import package::shared::packing;
+import package::shared::radiance;
+import package::shared::tiles;
+import package::shared::footprint;
+import package::shared::history;
+import package::shared::blocks;
+import package::shared::fallback;
+
+// Near taps.
+override NEAR_TAPS: u32 = 12u;
+// There are filtered blocks.
+override WIDE_FILTER: bool = true;
+
+@group(1) @binding(1) var in_guide: texture_2d<u32>;
+@group(1) @binding(2) var in_history: texture_2d<u32>;
+@group(1) @binding(3) var in_blocks: texture_2d<u32>;
+@group(1) @binding(4) var<storage, read> in_tiles: array<u32>;
+@group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 3>;
+@group(1) @binding(6) var out_output: texture_storage_2d<rgba16float, write>;
+
+// Near taps reach from so many pixels, for mirrors, to so many.
+const NEAR_LEAST: f32 = 1.5;
+const NEAR_MOST: f32 = 3.0;
+// Half axis of the filter, in pixels, from and to which blocks take over.
+const WIDE_FROM: f32 = 1.0;
+const WIDE_TO: f32 = 3.0;
+// Half axis below which, and from which no longer, taps may differ by noise alone.
+const SHARP_TO: f32 = 0.3;
+const SHARP_FROM: f32 = 0.7;
+// Weight of squared differences of brightness against their variance.
+const NOISE_FALLOFF: f32 = 0.1;
+// Taps of mirrors count as at most this many times as bright as the pixel.
+const GLINT_LIMIT: f32 = 8.0;
+const SHARE_TOLERANCE: f32 = 0.3;
+
+// What the blocks around a pixel agree on.
+struct Wide {
+    radiance: vec3<f32>,
+    // How well they fit, 0 to 1.
+    fit: f32,
+    // Variance of accumulated brightness.
+    variance: f32,
+}
+
+fn blocks_around(pixel: vec2<u32>, plane: Plane) -> Wide {
+    var sum: Wide;
+    for (var i = 0u; i < 4u; i++) {
+        let corner = corner_of(pixel, i);
+        let tap = unpack_block(textureLoad(in_blocks, corner.block, 0));
+        let share = select(0.0, corner.weight, tap.guide.denoised);
+        let w = select(0.0, corner.weight * exp(-plane_penalty(plane, tap.guide, block_place(corner.block))), tap.guide.denoised);
+        sum.radiance += w * tap.radiance;
+        sum.fit += w;
+        sum.variance += share * tap.deviation * tap.deviation;
+    }
+    sum.radiance *= 1.0 / max(sum.fit, 1e-6);
+    return sum;
+}
+
+// Trust in what has been accumulated for few frames.
+fn trust(length: f32) -> f32 {
+    return 0.2 + 0.8 * min(1.0, length * 0.25);
+}
+
+// Vogel's disk: each tap is turned against the one before by the golden angle.
+fn turned(direction: vec2<f32>) -> vec2<f32> {
+    return vec2<f32>(direction.x * -0.737368878 - direction.y * 0.675490294, direction.x * 0.675490294 - direction.y * 0.737368878);
+}
+
+// rgb: filtered radiance, exposed; a: variance of the accumulated brightness.
+fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
+    let own = unpack_history(textureLoad(in_history, pixel, 0).xy);
+    let own_radiance = min(own.radiance * frame.exposure, vec3<f32>(HALF_MAX));
+    let position = world_position(pixel, guide.depth);
+    let plane = plane_of(guide, position);
+    let footprint = lobe_footprint(position, guide, own.share);
+    let radius = vec2<f32>(footprint.along, footprint.across) * frame.filter_scale;
+    let side = side_of(footprint.axis);
+    var wide: Wide;
+    if WIDE_FILTER {
+        wide = blocks_around(pixel, plane);
+    }
+
+    let sharp = 1.0 - smoothstep(SHARP_TO, SHARP_FROM, radius.x);
+    let noise_falloff = NOISE_FALLOFF * sharp / (wide.variance + 1e-5);
+    let glint = GLINT_LIMIT * luminance(own_radiance);
+    let own_brightness = brightness(own_radiance);
+    let reach = clamp(radius, vec2<f32>(NEAR_LEAST), vec2<f32>(NEAR_MOST)) * inverseSqrt(max(f32(NEAR_TAPS), 1.0));
+    let falloff = 1.0 / max(radius, vec2<f32>(NEAR_LEAST));
+    var direction = vec2<f32>(1.0, 0.0);
+    // a: weight.
+    var sum = vec4<f32>(own_radiance, 1.0) * trust(own.length);
+    for (var i = 0u; i < NEAR_TAPS; i++) {
+        let point = direction * (reach * sqrt(f32(i) + 0.5));
+        direction = turned(direction);
+        let offset = round(footprint.axis * point.x + side * point.y);
+        let at = vec2<i32>(pixel) + vec2<i32>(offset);
+        let texel = clamp(at, vec2<i32>(0), vec2<i32>(frame.size) - 1);
+        let tap = unpack_guide(textureLoad(in_guide, texel, 0).xy);
+        let history = unpack_history(textureLoad(in_history, texel, 0).xy);
+        let radiance = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
+        let kept = radiance * mix(1.0, min(1.0, glint / luminance(radiance)), sharp);
+        let rho = vec2<f32>(dot(offset, footprint.axis), dot(offset, side)) * falloff;
+        let apart = (history.share - own.share) / SHARE_TOLERANCE;
+        let brighter = brightness(radiance) - own_brightness;
+        let penalty = plane_penalty(plane, tap, vec2<f32>(texel) + 0.5) + 1.2 * dot(rho, rho) + apart * apart
+            + noise_falloff * brighter * brighter;
+        let counts = tap.denoised && all(at == texel) && any(at != vec2<i32>(pixel));
+        let w = select(0.0, trust(history.length) * exp(-penalty), counts);
+        sum += vec4<f32>(select(vec3<f32>(0.0), kept, counts), 1.0) * w;
+    }
+    let near = sum.rgb / sum.a;
+    let by_blocks = smoothstep(WIDE_FROM, WIDE_TO, radius.x) * smoothstep(0.0, 0.3, wide.fit);
+    return vec4<f32>(mix(near, wide.radiance, by_blocks), wide.variance);
+}
+
+@compute @workgroup_size(8, 8)
+fn lobe_filter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let index = list_index(group);
+    if index >= in_args[0].w {
+        return;
+    }
+    let pixel = unpack_tile(in_tiles[index]) * TILE_SIZE + lane_position(lane);
+    if any(pixel >= frame.size) {
+        return;
+    }
+    let guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
+    var result: vec4<f32>;
+    if guide.denoised {
+        result = filtered(pixel, guide);
+        result = vec4<f32>(min(result.rgb * frame.inverse_exposure, vec3<f32>(HALF_MAX)), result.a);
+    } else {
+        result = vec4<f32>(fallback_radiance(pixel, guide), 0.0);
+    }
+    textureStore(out_output, pixel, rounded_to_half(result));
+}

@@ -1,0 +1,96 @@
+// Averages over 4x4 blocks of pixels, from which wide filters read: one texel holds all of a block, so that a tap
+// is a single load.
+
+import package::shared::frame;
+import package::shared::packing;
+import package::shared::color;
+
+const BLOCK_SIZE: u32 = 4u;
+
+struct Block {
+    // The G-buffer of the pixel that stands for the block; not `denoised` where none is.
+    guide: Guide,
+    // Mean radiance, exposed.
+    radiance: vec3<f32>,
+    // Mean of what was cut off from outliers, exposed.
+    excess: vec3<f32>,
+    // Hit share.
+    share: f32,
+    // Deviation of brightness, 0 to 1.
+    deviation: f32,
+}
+
+// Three numbers of 9 bits with an exponent in common, rounded to nearest: rgb9e5.
+fn pack_shared_exponent(radiance: vec3<f32>) -> u32 {
+    let c = clamp(radiance, vec3<f32>(0.0), vec3<f32>(65408.0));
+    let largest = max(c.x, max(c.y, c.z));
+    let exponent = clamp(i32(bitcast<u32>(largest * 1.001) >> 23u) - 126, -15, 16);
+    let scale = exp2(f32(9 - exponent));
+    let words = min(vec3<u32>(round(c * scale)), vec3<u32>(511u));
+    return words.x | (words.y << 9u) | (words.z << 18u) | (u32(exponent + 15) << 27u);
+}
+
+fn unpack_shared_exponent(word: u32) -> vec3<f32> {
+    let scale = exp2(f32(word >> 27u) - 24.0);
+    return vec3<f32>(vec3<u32>(word, word >> 9u, word >> 18u) & vec3<u32>(511u)) * scale;
+}
+
+fn pack_block(block: Block) -> vec4<u32> {
+    let oct = vec2<u32>(round((oct_encode(block.guide.normal) * 0.5 + 0.5) * 511.0));
+    let roughness = u32(round(saturate(block.guide.roughness) * 63.0));
+    let share = u32(round(saturate(block.share) * 255.0));
+    // The last 8 bits of depth make room.
+    let depth = (bitcast<u32>(block.guide.depth) + 128u) & 0xffffff00u;
+    let deviation = u32(round(saturate(block.deviation) * 255.0));
+    return vec4<u32>(
+        select(0u, depth | deviation, block.guide.denoised),
+        oct.x | (oct.y << 9u) | (roughness << 18u) | (share << 24u),
+        pack_shared_exponent(block.radiance),
+        pack_shared_exponent(block.excess),
+    );
+}
+
+fn unpack_block(texel: vec4<u32>) -> Block {
+    let oct = vec2<f32>(vec2<u32>(texel.y, texel.y >> 9u) & vec2<u32>(511u)) * (2.0 / 511.0) - 1.0;
+    var block: Block;
+    block.guide.normal = oct_decode(oct);
+    block.guide.depth = bitcast<f32>(texel.x & 0xffffff00u);
+    block.guide.roughness = f32((texel.y >> 18u) & 63u) * (1.0 / 63.0);
+    block.guide.denoised = texel.x != 0u;
+    block.share = f32(texel.y >> 24u) * (1.0 / 255.0);
+    block.deviation = f32(texel.x & 255u) * (1.0 / 255.0);
+    block.radiance = unpack_shared_exponent(texel.z);
+    block.excess = unpack_shared_exponent(texel.w);
+    return block;
+}
+
+// The largest indices of blocks on screen.
+fn last_block() -> vec2<i32> {
+    return vec2<i32>((frame.size - 1u) / BLOCK_SIZE);
+}
+
+// Place on screen, in pixels, that stands for a block.
+fn block_place(block: vec2<i32>) -> vec2<f32> {
+    return min(vec2<f32>(block * i32(BLOCK_SIZE)) + 1.5, vec2<f32>(frame.size) - 0.5);
+}
+
+// One of the four blocks around a pixel.
+struct Corner {
+    block: vec2<i32>,
+    // Bilinear weight.
+    weight: f32,
+}
+
+fn corner_of(pixel: vec2<u32>, corner: u32) -> Corner {
+    let place = (vec2<f32>(pixel) + 0.5) / f32(BLOCK_SIZE) - 0.5;
+    let base = floor(place);
+    let offset = vec2<u32>(corner & 1u, corner >> 1u);
+    let weight = select(1.0 - (place - base), place - base, offset == vec2<u32>(1u));
+    return Corner(clamp(vec2<i32>(base) + vec2<i32>(offset), vec2<i32>(0), last_block()), weight.x * weight.y);
+}
+
+// Luminance squeezed into 0 to 1, in which differences and deviations are measured.
+fn brightness(radiance: vec3<f32>) -> f32 {
+    let l = luminance(radiance);
+    return l / (1.0 + l);
+}
