@@ -140,12 +140,11 @@ fn ablations(report: &Report) -> String {
     let more = |without: f64, with: f64| without > with;
     let row = |info: &VariantInfo| {
         let (name, with) = (info.variant.name.as_str(), base.variant.name.as_str());
-        let note = info.variant.note.split(':').next().unwrap_or_default();
         let ratios = [
             report.overall_ratio(name).zip(report.overall_ratio(with)),
             report.overall_cpu_ratio(name).zip(report.overall_cpu_ratio(with)),
         ];
-        let mut row = vec![escape(name), escape(note)];
+        let mut row = vec![escape(name), escape(&info.variant.note)];
         row.extend(ratios.map(|pair| difference(pair, more)));
         row.extend(ABLATION_COUNTS.map(|name| difference(count(info, name).zip(count(base, name)), more)));
         let values = report.overall(name);

@@ -129,7 +129,7 @@ fn features_are_left_out_one_by_one() {
         |settings: &limpid::Settings| Counts::new(settings, SIZE).unwrap().instructions.values().sum::<u64>();
     let whole = Preset::Default.settings();
     let ablations = Variant::ablations(load).unwrap();
-    let features: Vec<&Variant> = ablations.iter().filter(|v| v.name.starts_with("features.")).collect();
+    let features: Vec<&Variant> = ablations.iter().filter(|v| v.note.contains("features.")).collect();
     let flags = serde_json::to_string(&whole.features).unwrap().matches(":true").count();
     assert!(flags > 0 && features.len() == flags, "{flags} flags");
     for variant in features {

@@ -98,7 +98,7 @@ impl Variant {
         };
         let features = features_of(&Preset::Default.settings())?.into_iter().map(|feature| {
             let option = format!("features.{feature}=false");
-            ablation(option.clone(), "compiled without it", vec![option])
+            ablation(format!("no-{}", feature.replace('_', "-")), "compiled without", vec![option])
         });
         let constants = ABLATIONS.iter().map(|(name, note, options)| {
             ablation((*name).to_owned(), note, options.iter().map(|option| (*option).to_owned()).collect())
