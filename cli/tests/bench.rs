@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use limpid_cli::bench::Report;
+use limpid_cli::bench::{Report, Run};
 
 fn limpid(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_limpid")).args(arguments).output().unwrap()
@@ -85,6 +85,38 @@ fn what_was_interrupted_goes_on() {
     assert!(String::from_utf8_lossy(&compared.stdout).contains("default on still"), "{compared:?}");
     fs::remove_dir_all(whole).unwrap();
     fs::remove_dir_all(parts).unwrap();
+}
+
+/// Where Python has the package, the network beats its input and both have times; elsewhere the rest is measured.
+#[test]
+fn a_yardstick_is_measured_or_skipped_aloud() {
+    let out = folder("yardstick");
+    let yardstick = ["--scene", "still", "--no-ablations", "--yardstick", "oidn"];
+    let timed = ["--repetitions", "1", "--scaling-seconds", "0", "--out", out.to_str().unwrap()];
+    let small = ["bench", "--backend", "cpu", "--size", "64x36", "--frames", "4", "--samples", "8"];
+    let output = limpid(&[&small[..], &yardstick, &timed].concat());
+    succeeds(&output);
+    let report = report(&out);
+    assert!(report.run("still", "default").is_some());
+    match report.run("still", "oidn") {
+        Some(run) => {
+            let psnr = |run: &Run| run.mean.get("psnr").unwrap();
+            assert!(psnr(run) > psnr(report.run("still", "noisy").unwrap()) + 2.0);
+            assert!(run.times.as_ref().is_some_and(|times| times.cpu.median > 0.0));
+            assert_eq!(report.ratio_to_yardstick("oidn"), Some([1.0; 2]));
+        }
+        None => {
+            assert!(errors(&output).contains("SKIPPED: yardstick oidn"), "{}", errors(&output));
+            eprintln!("SKIPPED: the yardstick is not installed");
+        }
+    }
+    fs::remove_dir_all(&out).unwrap();
+    // Without Python at all.
+    let mut command = Command::new(env!("CARGO_BIN_EXE_limpid"));
+    let output = command.args(small).args(yardstick).args(timed).env("PATH", "").output().unwrap();
+    succeeds(&output);
+    assert!(errors(&output).contains("SKIPPED: yardstick oidn"), "{}", errors(&output));
+    fs::remove_dir_all(out).unwrap();
 }
 
 #[test]

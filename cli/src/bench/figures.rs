@@ -8,6 +8,7 @@ use super::variant::{ACCUMULATION, Group, NOISY};
 fn group_name(group: Group) -> &'static str {
     match group {
         Group::Baseline => "baselines",
+        Group::Yardstick => "not limpid",
         Group::Preset => "presets",
         Group::Chosen => "chosen settings",
         Group::Ablation => "default without one feature",
@@ -24,7 +25,7 @@ fn pareto(report: &Report, sequence: Option<&SequenceInfo>) -> Plot {
         Some(sequence) => report.run(&sequence.name, variant)?.times.as_ref().map(|times| times.ratio),
         None => report.overall_ratio(variant),
     };
-    let groups = [Group::Preset, Group::Chosen, Group::Ablation];
+    let groups = [Group::Preset, Group::Chosen, Group::Ablation, Group::Yardstick];
     let series = groups.into_iter().filter_map(|group| {
         let of_group = report.variants.iter().map(|info| &info.variant).filter(|variant| variant.group == group);
         let points: Vec<_> = of_group.filter_map(|v| Some((time(&v.name)?, psnr(&v.name)?, v.name.clone()))).collect();

@@ -9,7 +9,8 @@ use super::error::{self, Values};
 use super::record::{Run, Spread, Times};
 use super::subject::Subject;
 use super::variant::{ACCUMULATION, NOISY, REFERENCE, Variant};
-use crate::backend::{self, Backend, Choice, Denoised};
+use super::yardstick::{Oidn, Yardstick};
+use crate::backend::{self, Backend, Choice};
 use crate::metrics::Scorer;
 use crate::sequence::Frame;
 
@@ -26,7 +27,15 @@ pub trait Observer {
 enum Runner {
     Noisy,
     Accumulation(Box<Accumulation>),
+    Oidn(Box<Oidn>),
     Backend(Box<dyn Backend>),
+}
+
+/// What one frame took, in milliseconds.
+struct Timing {
+    wall: f64,
+    cpu: f64,
+    passes: Vec<(String, f64)>,
 }
 
 impl Runner {
@@ -34,6 +43,7 @@ impl Runner {
         match (&variant.settings, variant.name.as_str()) {
             (Some(settings), _) => Ok(Self::Backend(backend::open(choice, settings, subject.frames[0].size)?)),
             (None, ACCUMULATION) => Ok(Self::Accumulation(Box::default())),
+            (None, name) if name == Yardstick::Oidn.name() => Ok(Self::Oidn(Box::new(Yardstick::Oidn.open()?))),
             (None, name) => {
                 debug_assert_eq!(name, NOISY);
                 Ok(Self::Noisy)
@@ -41,13 +51,20 @@ impl Runner {
         }
     }
 
-    fn run(&mut self, frame: &Frame, exposure: f32) -> Result<(Vec<[f32; 3]>, Option<Denoised>)> {
+    fn run(&mut self, frame: &Frame, exposure: f32) -> Result<(Vec<[f32; 3]>, Option<Timing>)> {
         Ok(match self {
             Self::Noisy => (frame.radiance.iter().map(|&[r, g, b, _]| [r, g, b]).collect(), None),
             Self::Accumulation(accumulation) => (accumulation.add(frame), None),
+            Self::Oidn(oidn) => {
+                let answer = oidn.denoise(frame)?;
+                let (wall, cpu) = (milliseconds(answer.time), milliseconds(answer.cpu_time));
+                (answer.radiance, Some(Timing { wall, cpu, passes: Vec::new() }))
+            }
             Self::Backend(backend) => {
-                let mut denoised = backend.denoise(frame, exposure, None)?;
-                (std::mem::take(&mut denoised.radiance), Some(denoised))
+                let denoised = backend.denoise(frame, exposure, None)?;
+                let passes = denoised.pass_times.into_iter().map(|(kernel, time)| (kernel, milliseconds(time)));
+                let (wall, cpu) = (milliseconds(denoised.time), milliseconds(denoised.cpu_time));
+                (denoised.radiance, Some(Timing { wall, cpu, passes: passes.collect() }))
             }
         })
     }
@@ -59,25 +76,28 @@ struct Gathered {
     scorer: Scorer,
     frames: Vec<Values>,
     /// By repetition and frame.
-    times: Vec<Denoised>,
+    times: Vec<Timing>,
 }
 
 fn milliseconds(duration: std::time::Duration) -> f64 {
     duration.as_secs_f64() * 1e3
 }
 
-fn times(own: &[Denoised], reference: &[Denoised]) -> Option<Times> {
-    let of = |value: &dyn Fn(&Denoised) -> f64| Spread::of(own.iter().map(value).collect());
-    let time = |denoised: &Denoised| milliseconds(denoised.time);
-    let ratios = own.iter().zip(reference).map(|(own, reference)| time(own) / time(reference).max(1e-6));
+fn times(own: &[Timing], reference: &[Timing]) -> Option<Times> {
+    let of = |value: fn(&Timing) -> f64| Spread::of(own.iter().map(value).collect());
+    let ratio = |value: fn(&Timing) -> f64| {
+        let ratios = own.iter().zip(reference).map(|(own, reference)| value(own) / value(reference).max(1e-6));
+        Spread::of(ratios.collect()).map_or(1.0, |ratio| ratio.median)
+    };
     let mut passes: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-    for (kernel, duration) in own.iter().flat_map(|denoised| &denoised.pass_times) {
-        passes.entry(kernel.clone()).or_default().push(milliseconds(*duration));
+    for (kernel, time) in own.iter().flat_map(|timing| &timing.passes) {
+        passes.entry(kernel.clone()).or_default().push(*time);
     }
     Some(Times {
-        frame: of(&time)?,
-        cpu: of(&|denoised| milliseconds(denoised.cpu_time))?,
-        ratio: Spread::of(ratios.collect()).map_or(1.0, |ratio| ratio.median),
+        frame: of(|timing| timing.wall)?,
+        cpu: of(|timing| timing.cpu)?,
+        ratio: ratio(|timing| timing.wall),
+        cpu_ratio: ratio(|timing| timing.cpu),
         samples: own.len(),
         passes: passes.into_iter().filter_map(|(kernel, all)| Some((kernel, Spread::of(all)?.median))).collect(),
     })
@@ -105,12 +125,12 @@ pub fn run_group(
         for (index, frame) in subject.frames.iter().enumerate() {
             for (variant, gathered) in variants.iter().zip(&mut all) {
                 let is_first = repetition == 0;
-                if !is_first && variant.settings.is_none() {
+                if !is_first && !variant.is_timed() {
                     continue;
                 }
-                let (radiance, denoised) = gathered.runner.run(frame, subject.exposure)?;
+                let (radiance, timing) = gathered.runner.run(frame, subject.exposure)?;
                 let is_warm = !is_first || index >= WARM_UP.min(subject.frames.len() - 1);
-                gathered.times.extend(denoised.filter(|_| is_warm && repetitions > 0));
+                gathered.times.extend(timing.filter(|_| is_warm && repetitions > 0));
                 if is_first {
                     let score = gathered.scorer.score(&radiance, frame);
                     let regions = &subject.regions[index];

@@ -20,6 +20,7 @@ pub mod table;
 #[cfg(test)]
 mod tests;
 pub mod variant;
+pub mod yardstick;
 
 pub use figures::figures;
 pub use page::page;

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::error::{METRICS, Values};
 use super::figures;
 use super::plot::{escape, short};
-use super::record::Report;
+use super::record::{Report, VariantInfo};
 use super::table::{events, recovery_of};
 use super::variant::Group;
 
@@ -81,8 +81,15 @@ fn metric_cells(values: &Values) -> impl Iterator<Item = String> {
 }
 
 fn overview(report: &Report) -> String {
-    let mut header = plain(&["variant", "time"]);
+    let mut header = plain(&["variant", "time", "processor time"]);
     header[1].1 = "relative to Reference in the same run, geometric mean over sequences".to_owned();
+    header[2].1 = "of all processors together, relative to Reference".to_owned();
+    let yardstick = report.variants.iter().find(|info| info.variant.group == Group::Yardstick);
+    for what in ["time", "processor time"] {
+        header.extend(
+            yardstick.map(|info| (format!("{what} / {}", info.variant.name), "by way of Reference".to_owned())),
+        );
+    }
     header.extend(metric_header());
     let rows: Vec<_> = report
         .variants
@@ -90,7 +97,12 @@ fn overview(report: &Report) -> String {
         .map(|info| {
             let variant = &info.variant;
             let name = format!("<span title=\"{}\">{}</span>", escape(&variant.note), escape(&variant.name));
-            let mut row = vec![name, number(report.overall_ratio(&variant.name))];
+            let ratios = [report.overall_ratio(&variant.name), report.overall_cpu_ratio(&variant.name)];
+            let mut row = vec![name, number(ratios[0]), number(ratios[1])];
+            if yardstick.is_some() {
+                let ratios = report.ratio_to_yardstick(&variant.name);
+                row.extend([0, 1].map(|index| number(ratios.map(|ratios| ratios[index]))));
+            }
             row.extend(metric_cells(&report.overall(&variant.name)));
             row
         })
@@ -98,55 +110,72 @@ fn overview(report: &Report) -> String {
     table(&header, &rows)
 }
 
-/// What each feature buys: the default preset's value minus that without the feature, so better with it is green.
-fn ablations(report: &Report) -> String {
-    let base = report.overall("default");
-    let base_ratio = report.overall_ratio("default");
-    let mut header = plain(&["without", "what", "time"]);
-    header.extend(metric_header());
-    let signed = |without: f64, with: f64, is_worse: bool| {
-        let class = if (without - with).abs() < 5e-5 {
-            ""
-        } else if is_worse {
-            "worse"
-        } else {
-            "better"
-        };
-        format!("<span class=\"{class}\">{:+.4}</span>", without - with)
+/// `without - with`, red where it is a loss to be without.
+fn difference(pair: Option<(f64, f64)>, is_loss: impl Fn(f64, f64) -> bool) -> String {
+    let Some((without, with)) = pair else { return "-".to_owned() };
+    let class = match (without - with).abs() < 5e-5 {
+        true => "",
+        false if is_loss(without, with) => "worse",
+        false => "better",
     };
-    let rows: Vec<_> = report
-        .variants
-        .iter()
-        .filter(|info| info.variant.group == Group::Ablation)
-        .map(|info| {
-            let variant = &info.variant;
-            let mean = report.overall(&variant.name);
-            let ratio = report.overall_ratio(&variant.name);
-            let time = ratio.zip(base_ratio).map(|(without, with)| signed(without, with, without > with));
-            let note = variant.note.split(':').next().unwrap_or_default();
-            let mut row = vec![escape(&variant.name), escape(note), time.unwrap_or_else(|| "-".to_owned())];
-            row.extend(METRICS.iter().map(|metric| {
-                let pair = mean.get(metric.name).zip(base.get(metric.name));
-                pair.map_or_else(
-                    || "-".to_owned(),
-                    |(without, with)| signed(without, with, metric.badness(without) > metric.badness(with)),
-                )
-            }));
-            row
-        })
-        .collect();
+    format!("<span class=\"{class}\">{:+.4}</span>", without - with)
+}
+
+/// Costs that the table of ablations shows, of [`Counts::named`](super::counts::Counts::named).
+const ABLATION_COUNTS: [&str; 5] =
+    ["dispatches", "bytes read", "bytes written", "bytes allocated", "SPIR-V instructions"];
+
+/// What each feature costs and buys: without the feature minus the default preset.
+fn ablations(report: &Report) -> String {
+    let info_of = |group: Group| report.variants.iter().filter(move |info| info.variant.group == group);
+    let Some(base) = info_of(Group::Preset).find(|info| info.variant.name == "default") else { return String::new() };
+    let base_values = report.overall(&base.variant.name);
+    let count = |info: &VariantInfo, name: &str| {
+        let named = info.counts.as_ref()?.named();
+        named.into_iter().find(|(other, _)| other == name).map(|(_, value)| value)
+    };
+    let mut header = plain(&["without", "what", "time", "processor time"]);
+    header.extend(ABLATION_COUNTS.map(|name| (name.to_owned(), "when every pixel is denoised".to_owned())));
+    header.extend(metric_header());
+    let more = |without: f64, with: f64| without > with;
+    let row = |info: &VariantInfo| {
+        let (name, with) = (info.variant.name.as_str(), base.variant.name.as_str());
+        let ratios = [
+            report.overall_ratio(name).zip(report.overall_ratio(with)),
+            report.overall_cpu_ratio(name).zip(report.overall_cpu_ratio(with)),
+        ];
+        let mut row = vec![escape(name), escape(&info.variant.note)];
+        row.extend(ratios.map(|pair| difference(pair, more)));
+        row.extend(ABLATION_COUNTS.map(|name| difference(count(info, name).zip(count(base, name)), more)));
+        let values = report.overall(name);
+        row.extend(METRICS.iter().map(|metric| {
+            let pair = values.get(metric.name).zip(base_values.get(metric.name));
+            difference(pair, |without, with| metric.badness(without) > metric.badness(with))
+        }));
+        row
+    };
+    let rows: Vec<_> = info_of(Group::Ablation).map(row).collect();
     if rows.is_empty() {
         return String::new();
     }
     format!(
-        "<h2>What each feature buys</h2><p class=note>The default preset with one feature left out, minus the default \
-         preset: red is what is lost without it, green what is gained.</p>{}",
+        "<h2>What each feature costs and buys</h2><p class=note>The default preset with one feature left out, minus the \
+         default preset: red is what is lost without it, green what is gained. Bytes are a pixel.</p>{}",
         table(&header, &rows)
     )
 }
 
 fn details(report: &Report) -> String {
-    let mut header = plain(&["sequence", "variant", "ms", "quarter below", "quarter above", "processor ms", "ratio"]);
+    let mut header = plain(&[
+        "sequence",
+        "variant",
+        "ms",
+        "quarter below",
+        "quarter above",
+        "processor ms",
+        "ratio",
+        "processor ratio",
+    ]);
     header.extend(metric_header());
     let rows: Vec<_> = report
         .runs
@@ -154,8 +183,8 @@ fn details(report: &Report) -> String {
         .map(|run| {
             let mut row = vec![escape(&run.sequence), escape(&run.variant)];
             let times = run.times.as_ref();
-            let values = times.map(|t| [t.frame.median, t.frame.low, t.frame.high, t.cpu.median, t.ratio]);
-            (0..5).for_each(|index| row.push(number(values.map(|values| values[index]))));
+            let values = times.map(|t| [t.frame.median, t.frame.low, t.frame.high, t.cpu.median, t.ratio, t.cpu_ratio]);
+            (0..6).for_each(|index| row.push(number(values.map(|values| values[index]))));
             row.extend(metric_cells(&run.mean));
             row
         })

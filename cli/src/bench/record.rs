@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::counts::Counts;
 use super::error::Values;
 use super::subject::Event;
-use super::variant::Variant;
+use super::variant::{Group, Variant};
 
 /// What was asked for. Reports can be resumed only with the same.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -74,6 +74,8 @@ pub struct Times {
     pub cpu: Spread,
     /// Median of the ratio to Reference on the same frame right after each other.
     pub ratio: f64,
+    /// The same of [`Times::cpu`].
+    pub cpu_ratio: f64,
     /// Frames timed.
     pub samples: usize,
     /// Median of each pass, by the device's clock where it has one.
@@ -156,9 +158,27 @@ impl Report {
 
     /// Geometric mean over sequences of a variant's time relative to Reference.
     pub fn overall_ratio(&self, variant: &str) -> Option<f64> {
+        self.geometric_mean(variant, |times| times.ratio)
+    }
+
+    /// The same for the time of all processors together.
+    pub fn overall_cpu_ratio(&self, variant: &str) -> Option<f64> {
+        self.geometric_mean(variant, |times| times.cpu_ratio)
+    }
+
+    fn geometric_mean(&self, variant: &str, ratio: fn(&Times) -> f64) -> Option<f64> {
         let runs = self.runs.iter().filter(|run| run.variant == variant);
-        let logs: Vec<f64> = runs.filter_map(|run| run.times.as_ref()).map(|times| times.ratio.ln()).collect();
+        let logs: Vec<f64> = runs.filter_map(|run| run.times.as_ref()).map(|times| ratio(times).ln()).collect();
         (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp())
+    }
+
+    /// Time relative to a yardstick, if one took part: of a frame, and of all processors together. Both were
+    /// measured relative to Reference, in the same turns.
+    pub fn ratio_to_yardstick(&self, variant: &str) -> Option<[f64; 2]> {
+        let mut variants = self.variants.iter().map(|info| &info.variant);
+        let yardstick = variants.find(|variant| variant.group == Group::Yardstick)?;
+        let wall = self.overall_ratio(variant)? / self.overall_ratio(&yardstick.name)?;
+        Some([wall, self.overall_cpu_ratio(variant)? / self.overall_cpu_ratio(&yardstick.name)?])
     }
 
     /// Keeps the runs of an interrupted report that this one would repeat.

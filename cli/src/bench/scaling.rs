@@ -32,8 +32,8 @@ const SHARES: [f64; 6] = [0.0, 0.1, 0.25, 0.5, 0.75, 1.0];
 const TIMED: usize = 5;
 const WARM_UP: usize = 2;
 
-/// Bytes a pixel that a frame of this command and its copy on the device take.
-const FRAME_BYTES: f64 = 150.0;
+/// Bytes a pixel that two frames and their copies on the device take; 175 were measured at 8K on a software driver.
+const FRAME_BYTES: f64 = 200.0;
 
 /// Memory that can be had, in bytes, where the system tells.
 fn available_memory() -> Option<f64> {
@@ -96,8 +96,27 @@ fn time_of(choice: Choice, variant: &Variant, frames: &[Frame], share: f64) -> R
     Ok(Spread::of(times).map(point))
 }
 
-/// Times `variant` at every size and share of tiles that memory and a budget of time allow, on two frames that
-/// follow each other. `stop` is asked before each point. What is left out is said on standard error.
+/// Which image sizes to time.
+#[derive(Clone, Copy, Debug)]
+pub enum Sizes<'s> {
+    /// Those of [`SIZES`], from the smallest, for which memory and this time are enough.
+    Within(Duration),
+    /// These, made smaller where memory forbids them.
+    Exactly(&'s [UVec2]),
+}
+
+/// The largest size of the same shape that so many pixels are enough for.
+fn shrunk(size: UVec2, pixels: f64) -> UVec2 {
+    let factor = (pixels / pixels_of(size)).sqrt().min(1.0);
+    (size.as_dvec2() * factor).as_uvec2().max(UVec2::ONE)
+}
+
+fn pixels_of(size: UVec2) -> f64 {
+    f64::from(size.x) * f64::from(size.y)
+}
+
+/// Times `variant` at the wanted sizes and, unless they are exact, over the share of tiles that need denoising, on two
+/// frames that follow each other. `stop` is asked before each point. What is left out is said on standard error.
 ///
 /// # Errors
 ///
@@ -106,41 +125,32 @@ pub fn scaling(
     choice: Choice,
     variant: &Variant,
     frames: &[Frame],
-    budget: Duration,
+    sizes: Sizes<'_>,
     stop: &dyn Fn() -> bool,
 ) -> Result<Vec<ScalingPoint>> {
     let Some(settings) = &variant.settings else { return Ok(Vec::new()) };
-    let start = Instant::now();
-    let mut points = Vec::new();
     let base: Vec<Frame> = frames.iter().map(|frame| with_share(frame, 1.0)).collect();
-    let per_pixel = Plan::new(settings, SIZES[0])?.0.bytes_per_pixel() + 3.0 * FRAME_BYTES;
-    let mut last: Option<(f64, Duration)> = None;
-    for size in SIZES {
-        let pixels = f64::from(size.x) * f64::from(size.y);
-        let skip = |reason: &str| eprintln!("scaling: {}x{} and above left out: {reason}", size.x, size.y);
-        if available_memory().is_some_and(|available| pixels * per_pixel > 0.8 * available) {
-            skip("not enough memory");
-            break;
-        }
-        let expected = last.map_or(Duration::ZERO, |(before, took)| took.mul_f64(pixels / before));
-        if start.elapsed() + expected > budget {
-            skip("it would take longer than --scaling-seconds allows");
-            break;
-        }
-        if stop() {
+    let per_pixel = Plan::new(settings, SIZES[0])?.0.bytes_per_pixel() + FRAME_BYTES;
+    let fitting = || available_memory().map_or(f64::INFINITY, |available| 0.8 * available / per_pixel);
+    let point = |size: UVec2| {
+        let enlarged: Vec<Frame> = base.iter().map(|frame| resized(frame, size)).collect();
+        time_of(choice, variant, &enlarged, 1.0)
+    };
+    let budget = match sizes {
+        Sizes::Within(budget) => budget,
+        Sizes::Exactly(sizes) => {
+            let mut points = Vec::new();
+            for wanted in sizes.iter().take_while(|_| !stop()) {
+                let size = shrunk(*wanted, fitting());
+                if size != *wanted {
+                    eprintln!("scaling: {wanted} made {size}: not enough memory");
+                }
+                points.extend(point(size)?);
+            }
             return Ok(points);
         }
-        let begun = Instant::now();
-        let enlarged: Vec<Frame> = base.iter().map(|frame| resized(frame, size)).collect();
-        match time_of(choice, variant, &enlarged, 1.0) {
-            Ok(point) => points.extend(point),
-            Err(error) => {
-                skip(&format!("{error:#}"));
-                break;
-            }
-        }
-        last = Some((pixels, begun.elapsed()));
-    }
+    };
+    let mut points = growing(budget, &fitting, &point, stop);
     // At a size where overheads no longer matter and every machine still is quick.
     let base: Vec<Frame> = base.iter().map(|frame| resized(frame, SIZES[1])).collect();
     for share in SHARES.into_iter().filter(|share| *share < 1.0) {
@@ -151,4 +161,56 @@ pub fn scaling(
         points.extend(time_of(choice, variant, &frames, share)?);
     }
     Ok(points)
+}
+
+/// Points at growing sizes, until memory (`fitting` pixels) or the budget would not be enough or the device refuses.
+fn growing(
+    budget: Duration,
+    fitting: &dyn Fn() -> f64,
+    point: &dyn Fn(UVec2) -> Result<Option<ScalingPoint>>,
+    stop: &dyn Fn() -> bool,
+) -> Vec<ScalingPoint> {
+    let start = Instant::now();
+    let mut points = Vec::new();
+    let mut last: Option<(f64, Duration)> = None;
+    for size in SIZES {
+        let pixels = pixels_of(size);
+        let skip = |reason: &str| eprintln!("scaling: {}x{} and above left out: {reason}", size.x, size.y);
+        if pixels > fitting() {
+            skip("not enough memory");
+            break;
+        }
+        let expected = last.map_or(Duration::ZERO, |(before, took)| took.mul_f64(pixels / before));
+        if start.elapsed() + expected > budget {
+            skip("it would take longer than --scaling-seconds allows");
+            break;
+        }
+        if stop() {
+            break;
+        }
+        let begun = Instant::now();
+        match point(size) {
+            Ok(point) => points.extend(point),
+            Err(error) => {
+                skip(&format!("{error:#}"));
+                break;
+            }
+        }
+        last = Some((pixels, begun.elapsed()));
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_becomes_the_largest_of_its_shape() {
+        let wanted = UVec2::new(7680, 4320);
+        assert_eq!(shrunk(wanted, f64::INFINITY), wanted);
+        assert_eq!(shrunk(wanted, pixels_of(wanted) / 4.0), UVec2::new(3840, 2160));
+        assert!(pixels_of(shrunk(wanted, 1e6)) <= 1e6);
+        assert_eq!(shrunk(wanted, 0.0), UVec2::ONE);
+    }
 }

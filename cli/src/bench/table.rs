@@ -18,23 +18,30 @@ pub fn summary(report: &Report) -> String {
     for name in shown {
         let _ = write!(text, "{name:>10}");
     }
-    let _ = writeln!(text, "{:>10}{:>12}{:>12}", "time", "bytes/px", "dispatches");
+    let _ = write!(text, "{:>10}{:>10}{:>12}{:>12}", "time", "cpu", "bytes/px", "dispatches");
+    let yardstick = report.variants.iter().find(|info| info.variant.group == Group::Yardstick);
+    for what in ["time", "cpu"] {
+        let _ = yardstick.map(|info| write!(text, "{:>14}", format!("{what}/{}", info.variant.name)));
+    }
+    text.push('\n');
     for info in &report.variants {
         let mean = report.overall(&info.variant.name);
         let _ = write!(text, "{:<width$}", info.variant.name);
         for name in shown {
             let _ = write!(text, "{:>10}", cell(mean.get(name)));
         }
-        let ratio = report.overall_ratio(&info.variant.name);
-        let _ = write!(text, "{:>10}", ratio.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.2} x")));
-        match &info.counts {
-            Some(counts) => {
-                let _ = writeln!(text, "{:>12.1}{:>12}", counts.bytes_allocated, counts.dispatches);
-            }
-            None => {
-                let _ = writeln!(text, "{:>12}{:>12}", "-", "-");
-            }
+        let times = |ratio: Option<f64>| ratio.map_or_else(|| "-".to_owned(), |ratio| format!("{ratio:.2} x"));
+        let name = &info.variant.name;
+        let _ = write!(text, "{:>10}{:>10}", times(report.overall_ratio(name)), times(report.overall_cpu_ratio(name)));
+        let _ = match &info.counts {
+            Some(counts) => write!(text, "{:>12.1}{:>12}", counts.bytes_allocated, counts.dispatches),
+            None => write!(text, "{:>12}{:>12}", "-", "-"),
+        };
+        if yardstick.is_some() {
+            let ratios = report.ratio_to_yardstick(name);
+            [0, 1].into_iter().for_each(|k| text = format!("{text}{:>14}", times(ratios.map(|ratios| ratios[k]))));
         }
+        text.push('\n');
     }
     let _ = writeln!(text, "\n{} sequences; times relative to `reference` in the same run", report.sequences.len());
     let _ = writeln!(text, "on {}", report.device);
@@ -83,7 +90,7 @@ fn quoted(text: &str) -> String {
 pub fn csv(report: &Report) -> String {
     let mut text = "sequence,variant".to_owned();
     METRICS.iter().for_each(|metric| text = format!("{text},{}", metric.name));
-    text += ",ms_median,ms_low,ms_high,cpu_ms_median,time_ratio\n";
+    text += ",ms_median,ms_low,ms_high,cpu_ms_median,time_ratio,cpu_ratio\n";
     for run in &report.runs {
         let _ = write!(text, "{},{}", quoted(&run.sequence), quoted(&run.variant));
         for metric in METRICS {
@@ -93,9 +100,9 @@ pub fn csv(report: &Report) -> String {
             Some(times) => {
                 let frame = times.frame;
                 let _ = write!(text, ",{},{},{}", frame.median, frame.low, frame.high);
-                let _ = writeln!(text, ",{},{}", times.cpu.median, times.ratio);
+                let _ = writeln!(text, ",{},{},{}", times.cpu.median, times.ratio, times.cpu_ratio);
             }
-            None => text += ",,,,,\n",
+            None => text += ",,,,,,\n",
         }
     }
     text

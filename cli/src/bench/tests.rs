@@ -72,7 +72,14 @@ fn report(rms: &[f64], milliseconds: f64) -> Report {
     let counts = Counts::new(&Preset::Default.settings(), SIZE).unwrap();
     let frames: Vec<Values> = rms.iter().copied().map(values).collect();
     let frame = Spread { low: milliseconds, median: milliseconds, high: milliseconds };
-    let times = Times { frame, cpu: frame, ratio: milliseconds, samples: 1, passes: Default::default() };
+    let times = Times {
+        frame,
+        cpu: frame,
+        ratio: milliseconds,
+        cpu_ratio: milliseconds,
+        samples: 1,
+        passes: Default::default(),
+    };
     let (sequence, name) = ("still".to_owned(), "default".to_owned());
     let (events, shares) = (Vec::new(), Default::default());
     Report {
@@ -104,6 +111,31 @@ fn comparisons_see_errors_and_counts_but_neither_times_nor_noise() {
     let mut empty = before.clone();
     empty.runs.clear();
     assert_eq!(compare(&before, &empty).worse(), 2);
+}
+
+/// Every feature that the default preset has is left out by one variant, and its code with it.
+#[test]
+fn features_are_left_out_one_by_one() {
+    let load = |options: &[String]| {
+        let mut settings = serde_json::to_value(Preset::Default.settings())?;
+        for option in options {
+            let (path, value) = option.split_once('=').unwrap();
+            let place = settings.pointer_mut(&format!("/{}", path.replace('.', "/"))).unwrap();
+            *place = serde_json::from_str(value)?;
+        }
+        Ok(serde_json::from_value(settings)?)
+    };
+    let instructions =
+        |settings: &limpid::Settings| Counts::new(settings, SIZE).unwrap().instructions.values().sum::<u64>();
+    let whole = Preset::Default.settings();
+    let ablations = Variant::ablations(load).unwrap();
+    let features: Vec<&Variant> = ablations.iter().filter(|v| v.note.contains("features.")).collect();
+    let flags = serde_json::to_string(&whole.features).unwrap().matches(":true").count();
+    assert!(flags > 0 && features.len() == flags, "{flags} flags");
+    for variant in features {
+        let settings = variant.settings.as_ref().unwrap();
+        assert!(instructions(settings) < instructions(&whole), "{}", variant.name);
+    }
 }
 
 #[test]

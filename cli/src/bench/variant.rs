@@ -8,8 +8,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Group {
-    /// Not limpid: something to compare with.
+    /// What there is without a denoiser.
     Baseline,
+    /// A denoiser that is not limpid.
+    Yardstick,
     /// A preset.
     Preset,
     /// Settings that the user asked for.
@@ -27,7 +29,7 @@ pub struct Variant {
     pub group: Group,
     /// What it is, in a line.
     pub note: String,
-    /// Settings; `None` for baselines.
+    /// Settings; `None` for what is not limpid.
     pub settings: Option<Settings>,
 }
 
@@ -38,7 +40,7 @@ pub const NOISY: &str = "noisy";
 /// Name of plain accumulation.
 pub const ACCUMULATION: &str = "accumulation";
 
-/// Name, what is left out, and the settings that leave it out.
+/// Name, what is left out, and the constants that leave it out while the code stays.
 pub const ABLATIONS: &[(&str, &str, &[&str])] = &[
     ("no-history", "no temporal accumulation", &["reproject.min_history_cap=1", "reproject.max_history=1"]),
     ("no-parallax", "no reprojection by hit distance", &["reproject.parallax_normal_cosine=1"]),
@@ -72,28 +74,36 @@ impl Variant {
         ]
     }
 
+    /// Whether its run time is measured.
+    pub fn is_timed(&self) -> bool {
+        self.group != Group::Baseline
+    }
+
     /// A preset by its name on the command line.
     pub fn preset(name: &str, preset: Preset) -> Self {
         let settings = Some(preset.settings());
         Self { name: name.to_owned(), group: Group::Preset, note: format!("preset {name}"), settings }
     }
 
-    /// The default preset without each feature; `load` turns `PATH=VALUE` options into settings.
+    /// The default preset without each of its [`Features`](limpid::settings::Features), whose code is left out, and
+    /// without what [`ABLATIONS`] turn off by constants; `load` turns `PATH=VALUE` options into settings.
     ///
     /// # Errors
     ///
     /// Those of `load`.
     pub fn ablations(load: impl Fn(&[String]) -> Result<Settings>) -> Result<Vec<Self>> {
-        let ablation = |(name, note, options): &(&str, &str, &[&str])| {
-            let options: Vec<String> = options.iter().map(|option| (*option).to_owned()).collect();
-            Ok(Self {
-                name: (*name).to_owned(),
-                group: Group::Ablation,
-                note: format!("{note}: {}", options.join(", ")),
-                settings: Some(load(&options)?),
-            })
+        let ablation = |name: String, note: &str, options: Vec<String>| {
+            let note = format!("{note}: {}", options.join(", "));
+            Ok(Self { name, group: Group::Ablation, note, settings: Some(load(&options)?) })
         };
-        ABLATIONS.iter().map(ablation).collect()
+        let features = features_of(&Preset::Default.settings())?.into_iter().map(|feature| {
+            let option = format!("features.{feature}=false");
+            ablation(format!("no-{}", feature.replace('_', "-")), "compiled without", vec![option])
+        });
+        let constants = ABLATIONS.iter().map(|(name, note, options)| {
+            ablation((*name).to_owned(), note, options.iter().map(|option| (*option).to_owned()).collect())
+        });
+        features.chain(constants).collect()
     }
 
     /// A variant for each value of `PATH=A,B,C`. Commas inside of brackets separate nothing.
@@ -110,6 +120,13 @@ impl Variant {
         };
         split_values(values).into_iter().map(variant).collect()
     }
+}
+
+/// Names of the features that settings have on.
+fn features_of(settings: &Settings) -> Result<Vec<String>> {
+    let features = serde_json::to_value(&settings.features)?;
+    let features = features.as_object().into_iter().flatten();
+    Ok(features.filter(|(_, value)| **value == true).map(|(name, _)| name.clone()).collect())
 }
 
 fn split_values(text: &str) -> Vec<String> {

@@ -20,9 +20,10 @@ use crate::bench::compare::compare;
 use crate::bench::counts::Counts;
 use crate::bench::measure::{Observer, run_group};
 use crate::bench::record::VariantInfo;
-use crate::bench::scaling::scaling;
+use crate::bench::scaling::{Sizes, scaling};
 use crate::bench::subject::{self, Rendering};
 use crate::bench::variant::{Group, REFERENCE, Variant};
+use crate::bench::yardstick::Yardstick;
 use crate::bench::{Config, Report, Subject, figures, page, table};
 use crate::picture;
 use crate::scene;
@@ -66,12 +67,20 @@ pub(super) struct Bench {
     /// them. Can be given more than once.
     #[arg(long, value_name = "PATH=VALUE,...")]
     set: Vec<String>,
+    /// Another denoiser to measure on the same frames in turn; `oidn` wants Python with numpy and pyoidn. What is
+    /// not installed is skipped.
+    #[arg(long, value_enum)]
+    yardstick: Option<Yardstick>,
     /// Do not measure the default preset without each of its features.
     #[arg(long)]
     no_ablations: bool,
     /// Most seconds to spend on run time over image sizes, for each preset; 0 leaves it out.
     #[arg(long, default_value_t = 40, value_name = "SECONDS")]
     scaling_seconds: u64,
+    /// Image size for run time, instead of the usual ones and whatever it takes, such as 7680x4320. A size for which
+    /// there is not enough memory becomes the largest of its shape for which there is.
+    #[arg(long, value_parser = parse_size, value_name = "WIDTHxHEIGHT")]
+    scaling_size: Vec<UVec2>,
     /// What to run on.
     #[arg(long, value_enum, default_value_t)]
     backend: Choice,
@@ -158,6 +167,12 @@ impl Bench {
         let is_wanted = |name: &str| self.preset.is_empty() || self.preset.iter().any(|p| p == name);
         let presets = Preset::ALL.iter().filter(|(name, _)| *name == REFERENCE || is_wanted(name));
         variants.extend(presets.map(|(name, preset)| Variant::preset(name, *preset)));
+        if let Some(yardstick) = self.yardstick {
+            match yardstick.open() {
+                Ok(_) => variants.push(yardstick.variant()),
+                Err(error) => eprintln!("SKIPPED: yardstick {}: {error:#}", yardstick.name()),
+            }
+        }
         for file in &self.settings {
             let settings = SettingsOptions::new("default", Some(file), &[]).load()?;
             let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -253,7 +268,7 @@ impl Bench {
         }
         let pictures = self.out.join("pictures");
         self.keep_reference(subject, &pictures)?;
-        let repetitions = |v: &Variant| if v.settings.is_some() { self.repetitions.max(1) } else { 1 };
+        let repetitions = |v: &Variant| if v.is_timed() { self.repetitions.max(1) } else { 1 };
         let work: u32 = lacking.iter().map(|v| repetitions(v)).sum();
         let groups = lacking.len().div_ceil(GROUP) as u32 * self.repetitions.max(1);
         let bar = progress_bar(
@@ -296,9 +311,12 @@ impl Bench {
             if report.scaling.iter().any(|point| point.variant == variant.name) || interrupt::requested() {
                 continue;
             }
-            let budget = Duration::from_secs(self.scaling_seconds);
+            let sizes = match &self.scaling_size[..] {
+                [] => Sizes::Within(Duration::from_secs(self.scaling_seconds)),
+                sizes => Sizes::Exactly(sizes),
+            };
             let first = subject.frames.len().min(2);
-            let points = scaling(choice, &variant, &subject.frames[..first], budget, &interrupt::requested)?;
+            let points = scaling(choice, &variant, &subject.frames[..first], sizes, &interrupt::requested)?;
             // Half a curve would pass for a whole one.
             if !interrupt::requested() {
                 report.scaling.extend(points);

@@ -1,14 +1,17 @@
 //! `limpid stability`.
 
-use anyhow::{Result, bail};
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::ProgressBar;
 use limpid::{Preset, Settings};
 
 use super::interrupt;
 use crate::backend::{self, Choice};
+use crate::sequence::write_atomically;
 use crate::stability::probe::ProbeReport;
-use crate::stability::{Case, Report, library, run};
+use crate::stability::{Case, Report, figure, library, run};
 
 /// Tries to break the numbers of every preset on every backend, and judges the results by criteria.
 ///
@@ -29,6 +32,9 @@ pub(super) struct Stability {
     /// and cancellation arise, and the rounding error of what is written, by kernel and line. Long runs are left out.
     #[arg(long, conflicts_with = "backend")]
     probe: bool,
+    /// Write a picture of how near every verdict came to its limit.
+    #[arg(long, value_name = "FILE.svg", conflicts_with = "probe")]
+    figure: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -100,6 +106,11 @@ impl Stability {
         }
         progress.finish_and_clear();
         super::print(&if self.json { serde_json::to_string_pretty(&report)? + "\n" } else { report.to_string() })?;
+        if let Some(path) = &self.figure {
+            let svg = figure::svg(&report);
+            write_atomically(path, |file| std::io::Write::write_all(file, svg.as_bytes()))
+                .with_context(|| format!("cannot write {}", path.display()))?;
+        }
         match report.failures().count() {
             0 if interrupt::requested() => bail!("interrupted; these are the cases that were finished"),
             0 => Ok(()),

@@ -1,6 +1,5 @@
 //! Cameras: shots as data, matrices from them, and rays from matrices.
 
-use super::FRAMES_PER_SECOND;
 use glam::camera::rh::proj::directx::perspective;
 use glam::camera::rh::view;
 use glam::{Mat4, Quat, UVec2, Vec2, Vec3, Vec4};
@@ -41,9 +40,8 @@ impl Default for Shot {
 }
 
 impl Shot {
-    /// The camera at a frame of this shot. An empty image counts as square.
-    pub(super) fn camera(&self, frame: u32, size: UVec2) -> Camera {
-        let time = frame.saturating_sub(self.first) as f32 / FRAMES_PER_SECOND;
+    /// The camera `time` seconds into this shot. An empty image counts as square.
+    pub(super) fn camera(&self, time: f32, size: UVec2) -> Camera {
         let target = self.target + self.travel * time;
         let eye = target + Quat::from_rotation_y(self.turn * time) * (self.eye - self.target);
         let size = size.max(UVec2::ONE).as_vec2();

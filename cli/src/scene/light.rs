@@ -1,9 +1,9 @@
 //! Lights a surface point can sample: spheres, panels and the sun.
 
+use super::Scene;
 use super::lobe::frame_around;
-use super::object::{Object, Pose};
+use super::object::Pose;
 use super::shape::Shape;
-use super::sky::Sky;
 use glam::{Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 
@@ -33,19 +33,19 @@ pub(super) struct LightSample {
 }
 
 impl Light {
-    /// All lights of a scene with its objects at `poses`.
-    pub(super) fn gather(objects: &[Object], poses: &[Pose], sky: &Sky) -> Vec<Self> {
-        let lamps = objects.iter().zip(poses).enumerate();
+    /// All lights of a scene that shine at `time`, in seconds, with its objects at `poses`.
+    pub(super) fn gather(scene: &Scene, poses: &[Pose], time: f32) -> Vec<Self> {
+        let lamps = scene.objects.iter().zip(poses).enumerate();
         let lamps = lamps.filter_map(|(index, (object, &pose))| {
             let form = match object.shape {
                 Shape::Sphere { radius } => Form::Ball { centre: pose.position, radius },
                 Shape::Panel { half } => Form::Panel { pose, half },
                 _ => return None,
             };
-            let radiance = object.material.emission;
+            let radiance = object.emission(time);
             (radiance != Vec3::ZERO).then_some(Self { form, radiance, object: Some(index) })
         });
-        let sun = sky.sun.map(|sun| Self {
+        let sun = scene.sky.sun.map(|sun| Self {
             form: Form::Sun { direction: sun.direction, radius: sun.radius },
             radiance: sun.radiance,
             object: None,
@@ -73,6 +73,15 @@ impl Light {
             Form::Sun { direction, radius } => (PI * radius * radius, normal.dot(*direction) + radius),
         };
         self.radiance.element_sum() * solid_angle * cosine.clamp(0.0, 1.0)
+    }
+
+    /// Unit direction to its centre.
+    pub(super) fn centre(&self, point: Vec3) -> Vec3 {
+        match &self.form {
+            Form::Ball { centre, .. } => (centre - point).normalize_or(Vec3::Y),
+            Form::Panel { pose, .. } => (pose.position - point).normalize_or(Vec3::Y),
+            Form::Sun { direction, .. } => *direction,
+        }
     }
 
     /// Draws a direction towards the light: uniform over the cone of a sphere or the sun, over

@@ -3,7 +3,7 @@
 //!
 //! The signal is that of a real-time reflections pass: per pixel one ray in the GGX lobe of
 //! visible normals, its radiance **not** multiplied by any material term of the surface the
-//! camera sees. World units are metres, time runs at [`FRAMES_PER_SECOND`]. Everything is a
+//! camera sees. World units are metres, time runs at [`Scene::frames_per_second`]. Everything is a
 //! function of scene, frame number and pixel, whatever the number of threads.
 //!
 //! ```
@@ -46,7 +46,7 @@ use rayon::prelude::*;
 use sampler::{Sampler, hash};
 use world::World;
 
-/// Frame rate of every scene.
+/// Frame rate of the scenes in [`all`]; [`by_name`] has them at others too.
 pub const FRAMES_PER_SECOND: f32 = 60.0;
 
 /// Reference samples that leave an error below 40 dB (PSNR of `x / (1 + x)`) in every scene.
@@ -67,13 +67,30 @@ pub struct Scene {
     pub ambient: Vec3,
     /// Camera movement, by ascending first frame. Each shot begins with a cut.
     pub shots: Vec<Shot>,
+    /// What the time between two frames follows from, `> 0.0`.
+    pub frames_per_second: f32,
 }
 
 impl Scene {
+    /// The same movement at another frame rate. Cuts fall on the frame nearest to their time.
+    pub fn at_rate(mut self, frames_per_second: f32) -> Self {
+        for shot in &mut self.shots {
+            shot.first = (shot.first as f32 * frames_per_second / self.frames_per_second).round() as u32;
+        }
+        self.frames_per_second = frames_per_second;
+        self
+    }
+
+    /// Seconds from frame 0 to a frame.
+    fn time(&self, frame: u32) -> f32 {
+        frame as f32 / self.frames_per_second
+    }
+
     /// The camera of a frame, without jitter.
     pub fn camera(&self, frame: u32, size: UVec2) -> Camera {
         let shot = self.shots.iter().rev().find(|shot| shot.first <= frame);
-        shot.or(self.shots.first()).copied().unwrap_or_default().camera(frame, size)
+        let shot = shot.or(self.shots.first()).copied().unwrap_or_default();
+        shot.camera(self.time(frame.saturating_sub(shot.first)), size)
     }
 
     /// G-buffer, one-sample radiance of every pixel and, if `reference_samples` is not zero, the

@@ -56,6 +56,8 @@ pub struct Object {
     pub rest: Pose,
     /// How it moves from there.
     pub movement: Movement,
+    /// Begin and end of a time in which it emits nothing, seconds; by default there is none.
+    pub dark: [f32; 2],
 }
 
 impl Object {
@@ -68,6 +70,12 @@ impl Object {
         }
     }
 
+    /// Emitted radiance, `time` in seconds.
+    pub fn emission(&self, time: f32) -> Vec3 {
+        let [begin, end] = self.dark;
+        if (begin..end).contains(&time) { Vec3::ZERO } else { self.material.emission }
+    }
+
     /// A resting object; the scenes build theirs from here.
     pub(super) fn new(shape: Shape, position: Vec3, albedo: Pattern, finish: Finish) -> Self {
         Self {
@@ -75,6 +83,7 @@ impl Object {
             material: Material { albedo, finish, emission: Vec3::ZERO },
             rest: Pose { position, rotation: Quat::IDENTITY },
             movement: Movement::default(),
+            dark: [0.0; 2],
         }
     }
 
@@ -109,6 +118,12 @@ impl Object {
     /// Emits this radiance.
     pub(super) fn glowing(mut self, emission: Vec3) -> Self {
         self.material.emission = emission;
+        self
+    }
+
+    /// Emits nothing from the first to the second time, seconds.
+    pub(super) fn dark_within(mut self, seconds: [f32; 2]) -> Self {
+        self.dark = seconds;
         self
     }
 }

@@ -6,7 +6,7 @@
 //! hold for noisy signal and reference alike, so the reference is the mean of the signal.
 
 use super::gbuffer::Surface;
-use super::light::LightSample;
+use super::light::{Light, LightSample};
 use super::lobe::{Lobe, cosine_direction};
 use super::sampler::Sampler;
 use super::world::{Hit, World};
@@ -25,6 +25,9 @@ const MIRRORED_LAMP: f32 = 4.0;
 
 /// Fainter contributions to the reference are left to chance.
 const FAINT: f32 = 0.05;
+
+/// Density, per solid angle, that every light in a lobe is credited with.
+const OFF_PEAK: f32 = 0.1;
 
 /// Ambient light fades in crevices; at this distance, world units, to one half.
 const AMBIENT_REACH: f32 = 0.5;
@@ -49,12 +52,14 @@ pub(super) fn one_ray(world: &World, surface: &Surface, sampler: &mut Sampler) -
 /// Guibas 1995, "Optimally Combining Sampling Techniques").
 pub(super) fn mean(world: &World, surface: &Surface, key: u32, samples: u32) -> [f32; 3] {
     let lobe = Lobe::new(surface.normal, surface.view, surface.roughness);
+    let importance: Vec<f32> = world.lights.iter().map(|light| importance_in_lobe(light, surface, &lobe)).collect();
+    let total = importance.iter().sum::<f32>().max(f32::MIN_POSITIVE);
     let mut sum = Vec3::ZERO;
     for index in 0..samples {
         let mut sampler = Sampler::spread(key, index);
         let to_lobe = sampler.pair();
         if !lobe.is_mirror() {
-            sum += lamp_in_lobe(world, surface, &lobe, &mut sampler);
+            sum += lamp_in_lobe(world, surface.origin, &lobe, &importance, &mut sampler);
         }
         let Some(direction) = lobe.sample(to_lobe) else {
             continue;
@@ -65,8 +70,8 @@ pub(super) fn mean(world: &World, surface: &Surface, key: u32, samples: u32) -> 
             let share = match lobe.density(direction) {
                 0.0 => 1.0,
                 density => {
-                    let (origin, normal) = (surface.origin, surface.normal);
-                    density / (density + world.light_density(lamp, origin, normal, direction, distance))
+                    let rival = world.lights[lamp].density(surface.origin, direction, distance);
+                    density / (density + rival * importance[lamp] / total)
                 }
             };
             sum += world.lights[lamp].radiance * share;
@@ -76,10 +81,9 @@ pub(super) fn mean(world: &World, surface: &Surface, key: u32, samples: u32) -> 
     (sum / samples.max(1) as f32).to_array()
 }
 
-/// The share of lamps in the lobe that is found by sampling a light.
-fn lamp_in_lobe(world: &World, surface: &Surface, lobe: &Lobe, sampler: &mut Sampler) -> Vec3 {
-    let (origin, normal) = (surface.origin, surface.normal);
-    let sampled = world.sample_light(origin, normal, sampler.pair());
+/// The share of lamps in the lobe that is found by sampling a light in proportion to `importance`.
+fn lamp_in_lobe(world: &World, origin: Vec3, lobe: &Lobe, importance: &[f32], sampler: &mut Sampler) -> Vec3 {
+    let sampled = world.sample_light(origin, |light| importance[light], sampler.pair());
     let roulette = sampler.pair().x;
     let Some((light, sample)) = sampled else {
         return Vec3::ZERO;
@@ -92,6 +96,13 @@ fn lamp_in_lobe(world: &World, surface: &Surface, lobe: &Lobe, sampler: &mut Sam
         return Vec3::ZERO;
     }
     lit / worth
+}
+
+/// About how much a light matters in a lobe. Far off the peak some of a large light can still be
+/// near it.
+fn importance_in_lobe(light: &Light, surface: &Surface, lobe: &Lobe) -> f32 {
+    let at_centre = lobe.density(light.centre(surface.origin));
+    light.importance(surface.origin, surface.normal) * (at_centre + OFF_PEAK)
 }
 
 /// Radiance from the end of a reflected ray, except that of a lamp the ray meets without passing
@@ -132,7 +143,8 @@ fn diffuse(world: &World, hit: &Hit, sampler: &mut Sampler) -> Vec3 {
 
 /// Light from one sampled lamp, over a diffuse reflectance of one.
 fn direct(world: &World, origin: Vec3, normal: Vec3, random: Vec2) -> Vec3 {
-    let Some((light, sample)) = world.sample_light(origin, normal, random) else {
+    let importance = |light: usize| world.lights[light].importance(origin, normal);
+    let Some((light, sample)) = world.sample_light(origin, importance, random) else {
         return Vec3::ZERO;
     };
     let cosine = normal.dot(sample.direction);

@@ -1,11 +1,11 @@
 //! A scene at one moment: posed objects that rays can meet.
 
+use super::Scene;
 use super::bounds::Bounds;
 use super::light::{Light, LightSample};
 use super::lobe::MIRROR_ROUGHNESS;
 use super::object::{Object, Pose};
 use super::shape::Shape;
-use super::{FRAMES_PER_SECOND, Scene};
 use glam::{Mat3, Vec2, Vec3};
 
 /// A scene with every object where it is at one frame.
@@ -51,7 +51,7 @@ pub(super) struct Hit {
 
 impl<'a> World<'a> {
     pub(super) fn new(scene: &'a Scene, frame: u32) -> Self {
-        let time = frame as f32 / FRAMES_PER_SECOND;
+        let time = scene.time(frame);
         let poses: Vec<_> = scene.objects.iter().map(|o| o.pose(time)).collect();
         let body = |(object, pose): (&Object, &Pose)| Body {
             shape: object.shape,
@@ -64,7 +64,7 @@ impl<'a> World<'a> {
             scene,
             bounds: Bounds::pack(&spheres),
             bodies: scene.objects.iter().zip(&poses).map(body).collect(),
-            lights: Light::gather(&scene.objects, &poses, &scene.sky),
+            lights: Light::gather(scene, &poses, time),
             poses,
         }
     }
@@ -133,14 +133,18 @@ impl<'a> World<'a> {
         self.lights.iter().position(|light| light.object == object && light.shines_against(direction))
     }
 
-    /// Picks a light in proportion to its importance and draws a direction towards it. The sample
-    /// carries the probability of both.
-    pub(super) fn sample_light(&self, point: Vec3, normal: Vec3, random: Vec2) -> Option<(&Light, LightSample)> {
-        let importance = |light: &Light| light.importance(point, normal);
-        let total: f32 = self.lights.iter().map(importance).sum();
+    /// Picks a light in proportion to `importance`, by index, and draws a direction towards it.
+    /// The sample carries the probability of both.
+    pub(super) fn sample_light(
+        &self,
+        point: Vec3,
+        importance: impl Fn(usize) -> f32,
+        random: Vec2,
+    ) -> Option<(&Light, LightSample)> {
+        let total: f32 = (0..self.lights.len()).map(&importance).sum();
         let (mut left, mut choice) = (random.x * total, None);
-        for light in &self.lights {
-            let share = importance(light);
+        for (index, light) in self.lights.iter().enumerate() {
+            let share = importance(index);
             if share > 0.0 {
                 // What is left of the random number within the share is as good as new.
                 let rest = (left / share).min(1.0 - f32::EPSILON);
@@ -155,15 +159,5 @@ impl<'a> World<'a> {
         let mut sample = light.sample(point, random)?;
         sample.density *= probability;
         Some((light, sample))
-    }
-
-    /// Probability of [`World::sample_light`] per solid angle about a direction known to reach
-    /// a light after `distance`.
-    pub(super) fn light_density(&self, light: usize, point: Vec3, normal: Vec3, direction: Vec3, distance: f32) -> f32 {
-        let importance = |light: &Light| light.importance(point, normal);
-        let total: f32 = self.lights.iter().map(importance).sum();
-        let light = &self.lights[light];
-        let share = importance(light) / total.max(f32::MIN_POSITIVE);
-        share * light.density(point, direction, distance)
     }
 }

@@ -5,6 +5,7 @@
 
 mod case;
 mod extremes;
+pub mod figure;
 mod geometry;
 mod known;
 pub mod library;

@@ -3,7 +3,7 @@ use limpid::Preset;
 
 use super::case::{Case, Criterion, Pixel, noise};
 use super::run::run_case;
-use super::{Report, Verdict, library};
+use super::{Report, Verdict, figure, library};
 use crate::backend::Choice;
 
 /// Long enough for history to be full several times over.
@@ -45,6 +45,26 @@ fn fails(case: Case, criterion: &str) -> Verdict {
 
 fn changing(frame: usize, _: UVec2) -> Pixel {
     Pixel::lit(if frame < 4 { 1e4 } else { 1.0 })
+}
+
+/// A dot has the colour of its outcome and lies right of the limit where the verdict does not hold.
+#[test]
+fn figures_show_what_fails() {
+    let case = Case::new("test", "energy", changing).must(Criterion::Energy(0.9, 1.1));
+    let mut verdict = fails(case, "energy");
+    let x_of_last = |verdict: &Verdict, colour: &str| {
+        let svg = figure::svg(&Report { verdicts: vec![verdict.clone()] });
+        let dot = svg.lines().rfind(|line| line.starts_with("<circle") && line.contains(colour)).unwrap();
+        dot.split('"').nth(1).unwrap().parse::<f64>().unwrap()
+    };
+    (verdict.limit, verdict.measured) = (0.5, Some(5.0));
+    let failed = x_of_last(&verdict, "#b00020");
+    (verdict.passed, verdict.measured) = (true, Some(0.05));
+    let passed = x_of_last(&verdict, "#0072b2");
+    (verdict.passed, verdict.known) = (false, Some("a reason"));
+    (verdict.measured, verdict.limit) = (Some(0.5), 0.5);
+    let limit = x_of_last(&verdict, "#e69f00");
+    assert!(((failed - limit) - (limit - passed)).abs() < 0.2 && failed > limit, "{passed} {limit} {failed}");
 }
 
 #[test]

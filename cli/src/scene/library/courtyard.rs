@@ -31,6 +31,7 @@ pub(super) fn scene() -> Scene {
             fov_y: 50_f32.to_radians(),
             ..Shot::default()
         }],
+        frames_per_second: FRAMES_PER_SECOND,
     }
 }
 

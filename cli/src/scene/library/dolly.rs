@@ -25,6 +25,7 @@ pub(super) fn scene() -> Scene {
             Shot { eye: vec3(0.15, 1.35, 6.5), target: vec3(0.0, 1.0, 0.0), travel, ..Shot::default() },
             Shot { first: 12, eye: vec3(-2.4, 0.9, 4.2), target: vec3(0.6, 0.9, -2.0), travel, ..Shot::default() },
         ],
+        frames_per_second: FRAMES_PER_SECOND,
     }
 }
 

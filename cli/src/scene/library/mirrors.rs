@@ -25,6 +25,7 @@ pub(super) fn scene() -> Scene {
             turn: -9_f32.to_radians(),
             ..Shot::default()
         }],
+        frames_per_second: FRAMES_PER_SECOND,
     }
 }
 

@@ -1,28 +1,50 @@
 //! The built-in scenes, one file each.
 
+mod carousel;
 mod courtyard;
 mod dolly;
 mod gallery;
 mod mirrors;
+mod quay;
+mod railings;
+mod sparks;
 mod still;
+mod switch;
 
 use super::object::Object;
 use super::shape::Shape;
 use super::texture::{Finish, Pattern};
-use super::{Movement, Scene, Shot, Sky, Sun};
+use super::{FRAMES_PER_SECOND, Movement, Scene, Shot, Sky, Sun};
 use glam::{Quat, Vec2, Vec3, vec2, vec3};
 
 /// Names of all scenes, the default first.
-pub const NAMES: [&str; 5] = ["gallery", "courtyard", "mirrors", "dolly", "still"];
+pub const NAMES: [&str; 10] =
+    ["gallery", "courtyard", "mirrors", "dolly", "still", "railings", "carousel", "sparks", "quay", "switch"];
 
 /// All scenes, in the order of [`NAMES`].
 pub fn all() -> Vec<Scene> {
-    vec![gallery::scene(), courtyard::scene(), mirrors::scene(), dolly::scene(), still::scene()]
+    vec![
+        gallery::scene(),
+        courtyard::scene(),
+        mirrors::scene(),
+        dolly::scene(),
+        still::scene(),
+        railings::scene(),
+        carousel::scene(),
+        sparks::scene(),
+        quay::scene(),
+        switch::scene(),
+    ]
 }
 
-/// The scene of a name, or `None` if there is none; see [`NAMES`].
+/// The scene of a name, see [`NAMES`], or `None` if there is none. `NAME@RATE` is the scene at
+/// `RATE` frames per second, 1 to 1000: `dolly@24` makes longer steps.
 pub fn by_name(name: &str) -> Option<Scene> {
-    all().into_iter().find(|scene| scene.name == name)
+    let (name, rate) = match name.split_once('@') {
+        Some((name, rate)) => (name, rate.parse().ok().filter(|rate| (1.0..=1000.0).contains(rate))?),
+        None => (name, FRAMES_PER_SECOND),
+    };
+    all().into_iter().find(|scene| scene.name == name).map(|scene| scene.at_rate(rate))
 }
 
 /// One colour all over.
