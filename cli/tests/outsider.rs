@@ -60,7 +60,7 @@ fn runs() -> Vec<Run> {
         Run { name: "default", options: &[], case: default },
         Run {
             name: "moved",
-            options: &["--spirv-set", "1", "--spirv-binding-base", "5", "--spirv-version", "1.0", "--spirv-robust"],
+            options: &["--spirv-set", "1", "--spirv-binding-base", "5", "--spirv-version", "1.0"],
             case: moved,
         },
         Run { name: "few", options: &[], case: few },
