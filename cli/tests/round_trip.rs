@@ -18,10 +18,13 @@ mod tools;
 
 const SIZE: UVec2 = UVec2::new(60, 34);
 
+/// From entry point and text to SPIR-V.
+type Compile = Box<dyn Fn(&str, &str) -> Vec<u8>>;
+
 /// A way from a kernel through another language to SPIR-V.
 struct Detour {
     text: fn(&Kernel) -> String,
-    compile: Box<dyn Fn(&str, &str) -> Vec<u8>>,
+    compile: Compile,
     /// What was compiled before: most kernels are the same in most settings.
     compiled: HashMap<String, Vec<u32>>,
 }
