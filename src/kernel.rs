@@ -8,8 +8,8 @@ use naga::back::pipeline_constants::process_overrides;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, Expression, Handle, ImageClass, Literal, Statement, StorageAccess, TypeInner};
 
-use crate::Error;
 use crate::resource::{Access, Format};
+use crate::{Error, dead_code};
 
 /// File name below `kernels/` without its ending, and text.
 macro_rules! sources {
@@ -249,6 +249,7 @@ impl Kernel {
             .map_err(|e| fail("specialise", e.to_string()))?;
         let mut module = module.into_owned();
         remove_dead_branches(&mut module);
+        dead_code::remove(&mut module);
         naga::compact::compact(&mut module, naga::compact::KeepUnused::No);
         let info = validator()
             .validate(&module)

@@ -55,6 +55,7 @@
 
 #![forbid(unsafe_code)]
 
+mod dead_code;
 mod denoiser;
 pub mod emit;
 mod error;

@@ -7,6 +7,7 @@ pub mod analyze;
 pub mod backend;
 pub mod bench;
 pub mod commands;
+pub mod cost;
 pub mod export;
 pub mod metrics;
 pub mod picture;

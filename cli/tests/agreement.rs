@@ -5,32 +5,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::UVec2;
-use limpid::settings::DepthEncoding;
-use limpid::{FrameInputs, Settings};
+use limpid::Settings;
 use limpid_cli::scene;
-use limpid_cli::sequence::{ChannelNames, Frame, Sequence};
-use limpid_harness::{Case, Change, Executor, Images, Pixel, Step, Table, executors};
+use limpid_cli::sequence::{ChannelNames, Sequence};
+use limpid_harness::{Case, Executor, Table, executors};
 
-fn step(frame: &Frame) -> Step {
-    let pixel = |i: usize| Pixel {
-        radiance: frame.radiance[i],
-        normal: frame.normal[i],
-        roughness: frame.roughness[i],
-        depth: frame.depth[i],
-        motion: frame.motion[i],
-    };
-    let mut inputs = FrameInputs::new(frame.camera, frame.size);
-    inputs.reset = frame.reset;
-    let images = Images { size: frame.size, pixels: (0..frame.pixels()).map(pixel).collect() };
-    Step { change: Change::None, frame: inputs, images }
-}
+mod frames;
 
-fn case(frames: impl Iterator<Item = Frame>) -> Case {
-    let steps: Vec<_> = frames.map(|frame| step(&frame)).collect();
-    let mut settings = Settings::default();
-    settings.conventions.depth = DepthEncoding::Linear;
-    Case { settings, size: steps[0].images.size, steps }
-}
+use frames::case;
 
 fn is_first_on_device(all: &[Box<dyn Executor>], index: usize) -> bool {
     all[..index].iter().all(|other| other.device() != all[index].device())
@@ -74,7 +56,7 @@ fn the_built_in_scenes_are_the_same_everywhere() {
     let cases: Vec<_> = ["gallery", "courtyard", "mirrors", "dolly"]
         .map(|name| {
             let scene = scene::by_name(name).unwrap();
-            (name.to_owned(), case((0..6).map(|number| scene.render(number, size, 0))))
+            (name.to_owned(), case(&Settings::default(), (0..6).map(|number| scene.render(number, size, 0))))
         })
         .into();
     check(&cases);
@@ -92,7 +74,8 @@ fn the_public_sequences_are_the_same_everywhere() {
         .map(|name| {
             let folder = Path::new(&data).join("public").join(name);
             let sequence = Sequence::open(&folder, &ChannelNames::default()).unwrap();
-            (name.to_owned(), case((0..sequence.len().min(6)).map(|index| sequence.load(index).unwrap())))
+            let frames = (0..sequence.len().min(6)).map(|index| sequence.load(index).unwrap());
+            (name.to_owned(), case(&Settings::default(), frames))
         })
         .into();
     check(&cases);

@@ -83,6 +83,8 @@ fn usage_is_explained_and_mistakes_have_code_two() {
 fn plans_are_printed() {
     let plan = succeeds(&["plan", "--preset", "reference", "--size", "640x360"]);
     assert!(plan.contains("reproject") && plan.contains("6 dispatches"), "{plan}");
+    let fewer = succeeds(&["plan", "--features", "-spatial_filter,constant_roughness=0.3"]);
+    assert!(!fewer.contains("prefilter") && !fewer.contains("roughness "), "{fewer}");
     let json = succeeds(&["plan", "--json", "--set", "coverage.fallback=environment"]);
     let plan: limpid::Plan = serde_json::from_str(&json).unwrap();
     assert!(plan.inputs().any(|input| input == "environment"));

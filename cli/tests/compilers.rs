@@ -7,10 +7,14 @@ use limpid::Settings;
 use limpid::emit::{Checks, GlslDialect, ShaderModel, SpirvVersion};
 use limpid::export::{File, MANIFEST, Options, Target, bundle};
 use limpid::settings::{Fallback, NormalEncoding, RayList, RaysPerQuad};
+use proptest::prelude::*;
 use serde_json::Value;
 
+#[path = "../../tests/any_settings/mod.rs"]
+mod any_settings;
 mod tools;
 
+use any_settings::any_settings;
 use tools::Folder;
 
 /// Settings that keep little and settings that keep all.
@@ -112,6 +116,22 @@ fn spirv_is_valid_in_every_environment_and_binds_what_the_manifest_says() {
     }
 }
 
+/// Compiles all passes of an export as GLSL.
+fn compile_glsl(folder: &Folder, exported: &Exported, dialect: GlslDialect) {
+    for pass in exported.passes() {
+        let path = folder.join("pass.comp");
+        let text = String::from_utf8(exported.shader(pass, Target::Glsl).0.to_vec()).unwrap();
+        let define = pass["shaders"]["glsl"]["define"].as_str().map(|name| format!("#define {name}\n"));
+        let version = "#version 450\n";
+        fs::write(&path, text.replace(version, &format!("{version}{}", define.unwrap_or_default()))).unwrap();
+        let object = folder.join("pass.spv");
+        let vulkan = ["-V", "-o", object.to_str().unwrap()];
+        let api: &[&str] = if dialect == GlslDialect::Vulkan { &vulkan } else { &[] };
+        let messages = tools::run("glslangValidator", &[api, &[path.to_str().unwrap()]].concat());
+        assert!(!messages.to_lowercase().contains("warn"), "{messages}");
+    }
+}
+
 #[test]
 fn glsl_compiles_for_opengl_and_vulkan() {
     if !tools::has("glslangValidator") {
@@ -126,19 +146,7 @@ fn glsl_compiles_for_opengl_and_vulkan() {
             options.single_file = single_file;
             options.glsl.dialect = dialect;
             (options.glsl.first_set, options.glsl.first_binding) = (1, 2);
-            let exported = Exported::new(&settings, &options);
-            for pass in exported.passes() {
-                let path = folder.join("pass.comp");
-                let text = String::from_utf8(exported.shader(pass, Target::Glsl).0.to_vec()).unwrap();
-                let define = pass["shaders"]["glsl"]["define"].as_str().map(|name| format!("#define {name}\n"));
-                let version = "#version 450\n";
-                fs::write(&path, text.replace(version, &format!("{version}{}", define.unwrap_or_default()))).unwrap();
-                let object = folder.join("pass.spv");
-                let vulkan = ["-V", "-o", object.to_str().unwrap()];
-                let api: &[&str] = if dialect == GlslDialect::Vulkan { &vulkan } else { &[] };
-                let messages = tools::run("glslangValidator", &[api, &[path.to_str().unwrap()]].concat());
-                assert!(!messages.to_lowercase().contains("warn"), "{messages}");
-            }
+            compile_glsl(&folder, &Exported::new(&settings, &options), dialect);
         }
     }
 }
@@ -169,35 +177,46 @@ fn dxil_offsets(text: &str) -> BTreeMap<String, u64> {
     lines.filter_map(|line| field(line.trim_start_matches(';'))).collect()
 }
 
+// The library takes no profile below 6.0: the text for 5.1 is compiled as 6.0, in the older language too.
+const HLSL_MODES: &[(ShaderModel, &[&str])] = &[
+    (ShaderModel::V5_1, &["-T", "cs_6_0", "-HV", "2016"]),
+    (ShaderModel::V6_0, &["-T", "cs_6_0"]),
+    (ShaderModel::V6_0, &["-T", "cs_6_0", "-HV", "2021"]),
+    (ShaderModel::V6_2Half, &["-T", "cs_6_2", "-enable-16bit-types"]),
+    (ShaderModel::V6_0, &["-T", "cs_6_0", "-spirv"]),
+];
+
+/// Options for a mode of DXC.
+fn hlsl_options(model: ShaderModel, arguments: &[&str]) -> Options {
+    let is_spirv = arguments.contains(&"-spirv");
+    let mut options = only(Target::Hlsl);
+    options.hlsl.shader_model = model;
+    (options.hlsl.root_signature, options.hlsl.vk_binding) = (!is_spirv, is_spirv);
+    options
+}
+
+/// Compiles a pass of an export as HLSL.
+fn compile_hlsl(compiler: &limpid_dxc::Compiler, exported: &Exported, pass: &Value, arguments: &[&str]) -> Vec<u8> {
+    let (text, entry_point) = exported.shader(pass, Target::Hlsl);
+    let mut arguments = [arguments, &["-E", entry_point, "-WX"][..]].concat();
+    if let Some(define) = pass["shaders"]["hlsl"]["define"].as_str() {
+        arguments.extend(["-D", define]);
+    }
+    tools::compile_hlsl(compiler, std::str::from_utf8(text).unwrap(), &arguments)
+}
+
 #[test]
 fn hlsl_compiles_to_dxil_and_binds_what_the_manifest_says() {
     let Some(compiler) = tools::dxc() else { return };
-    // The library takes no profile below 6.0: the text for 5.1 is compiled as 6.0, in the older language too.
-    let cases: &[(ShaderModel, &[&str])] = &[
-        (ShaderModel::V5_1, &["-T", "cs_6_0", "-HV", "2016"]),
-        (ShaderModel::V6_0, &["-T", "cs_6_0"]),
-        (ShaderModel::V6_0, &["-T", "cs_6_0", "-HV", "2021"]),
-        (ShaderModel::V6_2Half, &["-T", "cs_6_2", "-enable-16bit-types"]),
-        (ShaderModel::V6_0, &["-T", "cs_6_0", "-spirv"]),
-    ];
     for settings in settings() {
-        for (number, (model, arguments)) in cases.iter().enumerate() {
-            let is_spirv = arguments.contains(&"-spirv");
-            let mut options = only(Target::Hlsl);
-            options.hlsl.shader_model = *model;
+        for (number, (model, arguments)) in HLSL_MODES.iter().enumerate() {
+            let mut options = hlsl_options(*model, arguments);
             (options.hlsl.first_space, options.hlsl.first_register) = (number as u32, number as u32);
-            (options.hlsl.root_signature, options.hlsl.vk_binding) = (!is_spirv, is_spirv);
             options.single_file = number == 2;
             let exported = Exported::new(&settings, &options);
             for pass in exported.passes() {
-                let (text, entry_point) = exported.shader(pass, Target::Hlsl);
-                let text = std::str::from_utf8(text).unwrap();
-                let mut arguments = [arguments, &["-E", entry_point, "-WX"][..]].concat();
-                if let Some(define) = pass["shaders"]["hlsl"]["define"].as_str() {
-                    arguments.extend(["-D", define]);
-                }
-                let object = tools::compile_hlsl(&compiler, text, &arguments);
-                if is_spirv {
+                let object = compile_hlsl(&compiler, &exported, pass, arguments);
+                if arguments.contains(&"-spirv") {
                     continue;
                 }
                 let text = compiler.disassemble(&object).unwrap();
@@ -274,35 +293,62 @@ fn wgsl_compiles_with_tint() {
     assert!(messages.contains(&format!("{} files without a remark", files.len())), "{messages}");
 }
 
-/// There is no compiler for Metal on Linux. A C++ compiler with a small stand-in for Metal's library checks names and
-/// types; address spaces, attributes and limits are left to `.github/workflows/metal.yml`.
+/// Checks names and types of all passes of an export as MSL. There is no compiler for Metal on Linux; a C++ compiler with a
+/// small stand-in for Metal's library leaves address spaces, attributes and limits to `.github/workflows/metal.yml`.
+fn check_msl(folder: &Folder, exported: &Exported) {
+    let library = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/tools");
+    for pass in exported.passes() {
+        let path = folder.join("pass.cpp");
+        fs::write(&path, exported.shader(pass, Target::Msl).0).unwrap();
+        let warnings =
+            ["-Wall", "-Wextra", "-Wshadow", "-Werror", "-Wno-unknown-attributes", "-Wno-ignored-attributes"];
+        let mode = ["-std=c++17", "-fsyntax-only", "-fdeclspec", "-x", "c++", "-I", library.to_str().unwrap()];
+        tools::run("clang++-14", &[&mode[..], &warnings, &[path.to_str().unwrap()]].concat());
+        let text = fs::read_to_string(&path).unwrap();
+        for binding in pass["bindings"].as_array().unwrap() {
+            let at = &binding["msl"];
+            let (variable, table) = (binding["variable"].as_str().unwrap(), at["table"].as_str().unwrap());
+            let argument = format!("{variable} [[{table}({})]]", at["index"]);
+            assert!(text.contains(&argument), "{}: {argument}", pass["name"]);
+        }
+    }
+}
+
 #[test]
 fn msl_has_the_right_types() {
     if !tools::has("clang++-14") {
         return;
     }
     let folder = Folder::new("msl");
-    let library = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/tools");
     for settings in settings() {
-        let exported = Exported::new(&settings, &only(Target::Msl));
-        for pass in exported.passes() {
-            let path = folder.join("pass.cpp");
-            fs::write(&path, exported.shader(pass, Target::Msl).0).unwrap();
-            let warnings =
-                ["-Wall", "-Wextra", "-Wshadow", "-Werror", "-Wno-unknown-attributes", "-Wno-ignored-attributes"];
-            let mode = ["-std=c++17", "-fsyntax-only", "-fdeclspec", "-x", "c++", "-I", library.to_str().unwrap()];
-            tools::run("clang++-14", &[&mode[..], &warnings, &[path.to_str().unwrap()]].concat());
-            let text = fs::read_to_string(&path).unwrap();
-            for binding in pass["bindings"].as_array().unwrap() {
-                let at = &binding["msl"];
-                let argument = format!(
-                    "{} [[{}({})]]",
-                    binding["variable"].as_str().unwrap(),
-                    at["table"].as_str().unwrap(),
-                    at["index"]
-                );
-                assert!(text.contains(&argument), "{}: {argument}", pass["name"]);
-            }
-        }
+        check_msl(&folder, &Exported::new(&settings, &only(Target::Msl)));
     }
+}
+
+/// The same settings in every run, unless `PROPTEST_CASES` asks for so many new ones.
+#[test]
+fn random_settings_compile_with_every_compiler() {
+    let (dxc, has_glslang, has_clang) = (tools::dxc(), tools::has("glslangValidator"), tools::has("clang++-14"));
+    let folder = Folder::new("random");
+    let dialect = prop_oneof![Just(GlslDialect::OpenGl), Just(GlslDialect::Vulkan)];
+    let (mut runner, _) = limpid_harness::runner(file!(), 4);
+    let cases = (any_settings(), dialect, 0..HLSL_MODES.len());
+    let compile = |(settings, dialect, mode): (Settings, GlslDialect, usize)| {
+        let (model, arguments) = HLSL_MODES[mode];
+        let mut options = hlsl_options(model, arguments);
+        options.targets = vec![Target::Hlsl, Target::Glsl, Target::Msl];
+        options.glsl.dialect = dialect;
+        let exported = Exported::new(&settings, &options);
+        for (compiler, pass) in dxc.iter().flat_map(|dxc| exported.passes().iter().map(move |pass| (dxc, pass))) {
+            compile_hlsl(compiler, &exported, pass, arguments);
+        }
+        if has_glslang {
+            compile_glsl(&folder, &exported, dialect);
+        }
+        if has_clang {
+            check_msl(&folder, &exported);
+        }
+        Ok(())
+    };
+    runner.run(&cases, compile).unwrap();
 }

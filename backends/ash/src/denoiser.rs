@@ -106,7 +106,8 @@ impl Denoiser {
     /// # Safety
     ///
     /// The handles of `gpu` and `options` belong together and stay valid until the denoiser is dropped. The
-    /// extensions and features that `options` names are enabled, and `shaderStorageImageExtendedFormats`.
+    /// extensions and features that `options` names are enabled, and `shaderStorageImageExtendedFormats`. What
+    /// [`Options::spirv`] makes is valid and binds what it is said to.
     ///
     /// # Errors
     ///
@@ -145,7 +146,7 @@ impl Denoiser {
 
     fn on(gpu: Arc<Shared>, core: limpid::Denoiser, options: Options) -> Result<Self, Error> {
         let frames_in_flight = options.frames_in_flight.max(1);
-        let pipelines = Pipelines::new(&gpu, core.plan(), core.kernels(), options.pipeline_cache)?;
+        let pipelines = Pipelines::new(&gpu, core.plan(), core.kernels(), &options)?;
         let sized = new_sized(&gpu, core.plan(), &pipelines, &options)?;
         let alignment = gpu.limits.min_uniform_buffer_offset_alignment.max(1);
         let constants_stride = (size_of::<FrameConstants>() as u64).next_multiple_of(alignment);

@@ -40,6 +40,8 @@ pub(crate) struct Shared {
     pub(crate) timestamp_valid_bits: u32,
     pub(crate) synchronization: Synchronization,
     pub(crate) debug_utils: Option<ash::ext::debug_utils::Device>,
+    /// Asks what the driver's compiler made of pipelines, which then keep it.
+    pub(crate) statistics: Option<ash::khr::pipeline_executable_properties::Device>,
     memory: Mutex<Box<dyn MemorySource>>,
 }
 
@@ -81,6 +83,7 @@ impl Shared {
             timestamp_valid_bits: family.timestamp_valid_bits,
             synchronization,
             debug_utils,
+            statistics: None,
             memory: Mutex::new(memory),
         })
     }

@@ -49,6 +49,8 @@ pub mod offscreen;
 mod options;
 mod pipelines;
 mod resources;
+#[cfg(feature = "offscreen")]
+mod statistics;
 mod timing;
 
 pub use ash;
@@ -56,5 +58,5 @@ pub use denoiser::{Denoiser, OwnImage, RayList, Recorded};
 pub use error::Error;
 pub use gpu::{Gpu, Synchronization};
 pub use inputs::{Input, Inputs};
-pub use options::Options;
+pub use options::{Options, SpirvSource};
 pub use timing::PassTime;

@@ -1,6 +1,12 @@
+use std::sync::Arc;
+
 use ash::vk;
+use limpid::kernel::Kernel;
 
 use crate::gpu::Synchronization;
+
+/// Makes the SPIR-V of a kernel; see [`Options::spirv`].
+pub type SpirvSource = Arc<dyn Fn(&Kernel) -> Result<Vec<u32>, limpid::Error> + Send + Sync>;
 
 /// What a denoiser is made with, beside its settings.
 #[derive(Clone)]
@@ -22,6 +28,10 @@ pub struct Options {
     pub readable_intermediates: bool,
     /// Where pipelines are looked for and stored, or null.
     pub pipeline_cache: vk::PipelineCache,
+    /// Makes the SPIR-V of each kernel in the place of limpid: of what another compiler made of exported HLSL or GLSL,
+    /// or an optimiser of limpid's own. Version 1.3 or below, the entry point named as the kernel; set and binding are
+    /// group and number of [`Kernel::bindings`].
+    pub spirv: Option<SpirvSource>,
     /// Gives objects and passes names for debuggers. The instance extension `VK_EXT_debug_utils` is enabled.
     pub debug_utils: Option<ash::ext::debug_utils::Device>,
 }
@@ -36,6 +46,7 @@ impl Default for Options {
             timestamps: false,
             readable_intermediates: false,
             pipeline_cache: vk::PipelineCache::null(),
+            spirv: None,
             debug_utils: None,
         }
     }

@@ -7,8 +7,8 @@ use limpid::emit::SpirvOptions;
 use limpid::kernel::{Binding, BindingKind, Kernel};
 use limpid::plan::{Plan, Stage};
 
-use crate::Error;
 use crate::gpu::Shared;
+use crate::{Error, Options};
 
 pub(crate) fn descriptor_type(kind: BindingKind) -> vk::DescriptorType {
     match kind {
@@ -57,6 +57,7 @@ impl Drop for SetLayout {
 /// One pass on the device.
 pub(crate) struct Pipeline {
     gpu: Arc<Shared>,
+    pub(crate) kernel: &'static str,
     pub(crate) label: String,
     pub(crate) pipeline: vk::Pipeline,
     pub(crate) layout: vk::PipelineLayout,
@@ -75,7 +76,7 @@ impl Drop for Pipeline {
 }
 
 impl Pipeline {
-    fn new(gpu: &Arc<Shared>, kernel: &Kernel, inputs: &SetLayout, cache: vk::PipelineCache) -> Result<Self, Error> {
+    fn new(gpu: &Arc<Shared>, kernel: &Kernel, inputs: &SetLayout, options: &Options) -> Result<Self, Error> {
         let label = format!("limpid.{}", kernel.name);
         let own = kernel.bindings.iter().filter(|binding| binding.group == 1).cloned().collect();
         let own = SetLayout::new(gpu, &label, own)?;
@@ -84,11 +85,17 @@ impl Pipeline {
         // SAFETY: both layouts are alive.
         let layout = unsafe { gpu.device.create_pipeline_layout(&info, None) }
             .map_err(Error::vulkan(format!("creating the pipeline layout of {label}")))?;
-        let mut pipeline = Self { gpu: Arc::clone(gpu), label, pipeline: vk::Pipeline::null(), layout, own };
-        let options = SpirvOptions { debug_names: gpu.debug_utils.is_some(), ..SpirvOptions::default() };
-        let words = kernel.spirv(&options)?;
+        let mut pipeline =
+            Self { gpu: Arc::clone(gpu), kernel: kernel.name, label, pipeline: vk::Pipeline::null(), layout, own };
+        let words = match &options.spirv {
+            Some(source) => source(kernel)?,
+            None => {
+                let debug_names = gpu.debug_utils.is_some();
+                kernel.spirv(&SpirvOptions { debug_names, ..SpirvOptions::default() })?
+            }
+        };
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
-        // SAFETY: naga wrote valid SPIR-V 1.3, which Vulkan 1.1 accepts.
+        // SAFETY: naga wrote valid SPIR-V 1.3, which Vulkan 1.1 accepts, or the caller promises as much.
         let module = unsafe { gpu.device.create_shader_module(&info, None) }
             .map_err(Error::vulkan(format!("creating the shader module of {}", pipeline.label)))?;
         let entry_point = std::ffi::CString::new(kernel.name).unwrap_or_default();
@@ -96,9 +103,13 @@ impl Pipeline {
             .stage(vk::ShaderStageFlags::COMPUTE)
             .module(module)
             .name(&entry_point);
-        let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
+        let flags = match gpu.statistics {
+            Some(_) => vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR,
+            None => vk::PipelineCreateFlags::empty(),
+        };
+        let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout).flags(flags);
         // SAFETY: module and layout are alive, and the layout has every binding of the kernel.
-        let created = unsafe { gpu.device.create_compute_pipelines(cache, &[info], None) };
+        let created = unsafe { gpu.device.create_compute_pipelines(options.pipeline_cache, &[info], None) };
         // SAFETY: pipelines do not need their module any more.
         unsafe { gpu.device.destroy_shader_module(module, None) };
         let created = created
@@ -125,12 +136,7 @@ pub(crate) fn stage_index(stage: Stage) -> usize {
 }
 
 impl Pipelines {
-    pub(crate) fn new(
-        gpu: &Arc<Shared>,
-        plan: &Plan,
-        kernels: &[Kernel],
-        cache: vk::PipelineCache,
-    ) -> Result<Self, Error> {
+    pub(crate) fn new(gpu: &Arc<Shared>, plan: &Plan, kernels: &[Kernel], options: &Options) -> Result<Self, Error> {
         let inputs = |stage| {
             let mut bindings: Vec<Binding> = Vec::new();
             let of_stage = plan.passes.iter().zip(kernels).filter(|(pass, _)| pass.stage == stage);
@@ -144,7 +150,7 @@ impl Pipelines {
         let inputs = [inputs(Stage::Classify)?, inputs(Stage::Denoise)?];
         let mut passes = Vec::new();
         for (pass, kernel) in plan.passes.iter().zip(kernels) {
-            passes.push(Pipeline::new(gpu, kernel, &inputs[stage_index(pass.stage)], cache)?);
+            passes.push(Pipeline::new(gpu, kernel, &inputs[stage_index(pass.stage)], options)?);
         }
         Ok(Self { passes, inputs })
     }

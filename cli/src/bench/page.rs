@@ -224,6 +224,38 @@ fn counts(report: &Report) -> String {
     table(&header, &rows)
 }
 
+/// Statistics of a GPU's compiler that are shown, and what they are called here.
+const COMPILED: &[(&str, &str)] =
+    &[("VGPRs", "VGPRs"), ("Instructions", "instructions"), ("Subgroups per SIMD", "waves")];
+
+fn compiled(report: &Report) -> String {
+    let with = || report.variants.iter().filter_map(|info| Some((&info.variant.name, info.compiled.as_ref()?)));
+    let Some(gpu) = with().next().map(|(_, cost)| cost.gpu.clone()) else { return String::new() };
+    let mut passes: Vec<&str> = Vec::new();
+    for pass in with().flat_map(|(_, cost)| &cost.passes) {
+        if !passes.contains(&pass.pass.as_str()) {
+            passes.push(&pass.pass);
+        }
+    }
+    let columns = || passes.iter().flat_map(|pass| COMPILED.iter().map(move |(name, title)| (*pass, *name, *title)));
+    let mut header = plain(&["variant"]);
+    header.extend(columns().map(|(pass, _, title)| (format!("{pass} {title}"), String::new())));
+    let rows: Vec<_> = with()
+        .map(|(variant, cost)| {
+            let cell = |(pass, name, _): (&str, &str, &str)| {
+                let value = cost.passes.iter().find(|other| other.pass == pass).and_then(|pass| pass.get(name));
+                value.map_or_else(|| "-".to_owned(), |value| value.to_string())
+            };
+            std::iter::once(escape(variant)).chain(columns().map(cell)).collect()
+        })
+        .collect();
+    format!(
+        "<h2>Compiled for {}</h2><p class=note>By Mesa's driver RADV, without that GPU: limpid cost.</p>{}",
+        escape(&gpu),
+        table(&header, &rows)
+    )
+}
+
 fn recovery(report: &Report) -> String {
     let rows: Vec<_> = events(report)
         .flat_map(|(sequence, what, first, end)| {
@@ -284,7 +316,7 @@ pub fn page(report: &Report, pictures: &[(String, Vec<u8>)]) -> String {
     html = html + "<h2>Scaling</h2>" + &show("scaling");
     html += "<h2>Costs that are the same everywhere</h2><p class=note>Of a frame in which every pixel is denoised. \
              Bytes are a pixel; each resource counts once a pass, taps around a pixel come from caches.</p>";
-    html += &counts(report);
+    html = html + &counts(report) + &compiled(report);
     html = html + "<h2>Passes</h2>" + &passes(report);
     html += "<h2>Last frames</h2><div class=pictures>";
     for (caption, png) in pictures {

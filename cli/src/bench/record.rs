@@ -10,6 +10,7 @@ use super::counts::Counts;
 use super::error::Values;
 use super::subject::Event;
 use super::variant::{Group, Variant};
+use crate::cost::Cost;
 
 /// What was asked for. Reports can be resumed only with the same.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -118,6 +119,9 @@ pub struct VariantInfo {
     pub variant: Variant,
     /// Not for baselines.
     pub counts: Option<Counts>,
+    /// What a GPU's compiler makes of its passes, where that can be asked. Never compared: it depends on the driver.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compiled: Option<Cost>,
 }
 
 /// Everything that was found.

@@ -9,6 +9,7 @@ use super::history::History;
 use super::record::{Config, Report, Run, SequenceInfo, Spread, Times, VariantInfo};
 use super::table::recovery_of;
 use super::variant::Variant;
+use crate::cost::{Cost, PassCost, Statistic};
 use crate::scene;
 
 const SIZE: UVec2 = UVec2::new(48, 27);
@@ -70,6 +71,9 @@ fn values(rms: f64) -> Values {
 fn report(rms: &[f64], milliseconds: f64) -> Report {
     let variant = Variant::preset("default", Preset::Default);
     let counts = Counts::new(&Preset::Default.settings(), SIZE).unwrap();
+    let statistics = vec![Statistic { name: "VGPRs".to_owned(), value: 77.0 }];
+    let pass = PassCost { pass: "fill".to_owned(), executable: String::new(), subgroup_size: 64, statistics };
+    let compiled = Cost { gpu: "navi21".to_owned(), passes: vec![pass] };
     let frames: Vec<Values> = rms.iter().copied().map(values).collect();
     let frame = Spread { low: milliseconds, median: milliseconds, high: milliseconds };
     let times = Times {
@@ -86,7 +90,7 @@ fn report(rms: &[f64], milliseconds: f64) -> Report {
         limpid: "0".to_owned(),
         config: Config { size: SIZE, frames: 3, samples: 1, repetitions: 1 },
         device: "none".to_owned(),
-        variants: vec![VariantInfo { variant, counts: Some(counts) }],
+        variants: vec![VariantInfo { variant, counts: Some(counts), compiled: Some(compiled) }],
         sequences: vec![SequenceInfo { name: sequence.clone(), size: SIZE, frames: 3, events, limit: None, shares }],
         runs: vec![Run { sequence, variant: name, mean: Values::mean(&frames), frames, times: Some(times) }],
         scaling: Vec::new(),
@@ -165,4 +169,5 @@ fn pages_load_nothing() {
     let links = page.replace("http://www.w3.org/2000/svg", "");
     assert!(!links.contains("http") && !links.contains("src=\"/"), "{links}");
     assert!(page.contains("<svg") && page.contains("AQID"));
+    assert!(page.contains("fill VGPRs") && page.contains("77"), "{page}");
 }

@@ -25,6 +25,7 @@ use crate::bench::subject::{self, Rendering};
 use crate::bench::variant::{Group, REFERENCE, Variant};
 use crate::bench::yardstick::Yardstick;
 use crate::bench::{Config, Report, Subject, figures, page, table};
+use crate::cost::{Driver, Job};
 use crate::picture;
 use crate::scene;
 use crate::sequence::{ChannelNames, write_atomically};
@@ -97,6 +98,9 @@ pub(super) struct Bench {
     #[arg(long, num_args = 2, value_names = ["BEFORE", "AFTER"])]
     compare: Option<Vec<PathBuf>>,
 }
+
+/// What RADV compiles for, where it is installed.
+const GPU: &str = "navi21";
 
 /// Variants measured together with the reference, so that not too many are in memory.
 const GROUP: usize = 6;
@@ -203,9 +207,13 @@ impl Bench {
 
     fn start(&self, choice: Choice, variants: &[Variant]) -> Result<Report> {
         let device = backend::open(choice, &Settings::default(), UVec2::splat(8))?.device().to_owned();
+        let (driver, program) = (Driver::find(None).ok(), std::env::current_exe()?);
+        let compiled =
+            |settings: &Settings| Job { program: &program, settings, kernels: None }.run(driver.as_ref()?, GPU).ok();
         let info = |variant: &Variant| {
-            let counts = variant.settings.as_ref().map(|settings| Counts::new(settings, UVec2::new(1920, 1080)));
-            Ok(VariantInfo { variant: variant.clone(), counts: counts.transpose()? })
+            let settings = variant.settings.as_ref();
+            let counts = settings.map(|settings| Counts::new(settings, UVec2::new(1920, 1080))).transpose()?;
+            Ok(VariantInfo { variant: variant.clone(), counts, compiled: settings.and_then(compiled) })
         };
         let mut report = Report {
             limpid: env!("CARGO_PKG_VERSION").to_owned(),

@@ -2,6 +2,7 @@
 
 mod analyze;
 mod bench;
+mod cost;
 mod demo;
 mod denoise;
 mod export;
@@ -35,6 +36,8 @@ enum Command {
     Analyze(analyze::Analyze),
     /// Writes shaders, tables and documents for engines that do not link Rust.
     Export(Box<export::Export>),
+    /// Prints what the compilers of GPUs make of each pass, without those GPUs.
+    Cost(cost::CostCommand),
     /// Measures error against run time, over presets, settings and features, and writes a report.
     Bench(Box<bench::Bench>),
     /// Tries to break the numbers of every preset on every backend, and judges the results by criteria.
@@ -55,6 +58,7 @@ impl Cli {
             Command::Denoise(denoise) => denoise.run(),
             Command::Analyze(analyze) => analyze.run(),
             Command::Export(export) => export.run(),
+            Command::Cost(cost) => cost.run(),
             Command::Bench(bench) => bench.run(),
             Command::Stability(stability) => stability.run(),
             Command::Plan(plan) => plan.run(),

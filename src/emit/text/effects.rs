@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use naga::{Block, Expression, Function, GlobalVariable, Handle, ImageQuery, Module, SampleLevel, Statement};
+use naga::{Block, Expression, Function, GlobalVariable, Handle, Module, Statement};
 
 use super::uses::count_uses;
 
@@ -107,37 +107,5 @@ fn global_of(function: &Function, pointer: Handle<Expression>) -> Option<Handle<
         Expression::GlobalVariable(global) => Some(global),
         Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => global_of(function, base),
         _ => None,
-    }
-}
-
-/// The expressions that an expression is made of.
-pub(super) fn operands(expression: &Expression) -> Vec<Handle<Expression>> {
-    match expression {
-        Expression::Compose { components, .. } => components.clone(),
-        &Expression::Access { base, index } => vec![base, index],
-        &Expression::AccessIndex { base, .. } => vec![base],
-        &Expression::Splat { value, .. } => vec![value],
-        &Expression::Swizzle { vector, .. } => vec![vector],
-        &Expression::Load { pointer } => vec![pointer],
-        &Expression::ImageLoad { image, coordinate, level, .. } => {
-            [Some(image), Some(coordinate), level].into_iter().flatten().collect()
-        }
-        &Expression::ImageSample { image, sampler, coordinate, level, .. } => {
-            let level = if let SampleLevel::Exact(level) = level { Some(level) } else { None };
-            [Some(image), Some(sampler), Some(coordinate), level].into_iter().flatten().collect()
-        }
-        &Expression::ImageQuery { image, query: ImageQuery::Size { level } } => {
-            [Some(image), level].into_iter().flatten().collect()
-        }
-        &Expression::ImageQuery { image, .. } => vec![image],
-        &Expression::Unary { expr, .. } | &Expression::As { expr, .. } => vec![expr],
-        &Expression::Binary { left, right, .. } => vec![left, right],
-        &Expression::Select { condition, accept, reject } => vec![condition, accept, reject],
-        &Expression::Relational { argument, .. } => vec![argument],
-        &Expression::Math { arg, arg1, arg2, arg3, .. } => {
-            [Some(arg), arg1, arg2, arg3].into_iter().flatten().collect()
-        }
-        &Expression::ArrayLength(array) => vec![array],
-        _ => Vec::new(),
     }
 }

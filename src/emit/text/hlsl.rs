@@ -154,7 +154,8 @@ fn helper_text(name: &str, half: bool) -> &'static str {
         "unpack_snorm2" => {
             "float2 unpack_snorm2(uint packed) {\n\
              \x20   int2 bits = int2(int(packed << 16u), int(packed)) >> 16;\n\
-             \x20   return clamp(float2(bits) / 32767.0, -1.0, 1.0);\n}\n"
+             \x20   precise float2 value = float2(bits) / 32767.0; // not times a rounded reciprocal\n\
+             \x20   return clamp(value, -1.0, 1.0);\n}\n"
         }
         "choose float2" => {
             "// Component by component.\n\

@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 
 use naga::{BinaryOperator, Expression, Function, Handle, LocalVariable};
 
-use super::effects::operands;
+use crate::dead_code::operands;
 
 /// A statement as it is printed.
 #[derive(Debug, Clone)]

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use naga::{Block, Expression, Function, Handle, LocalVariable, Statement};
 
-use super::effects::{Effects, operands};
+use super::effects::Effects;
+use crate::dead_code::operands;
 
 /// How often each variable is set as a whole.
 pub(super) fn count_stores(block: &Block, function: &Function, stores: &mut HashMap<Handle<LocalVariable>, usize>) {

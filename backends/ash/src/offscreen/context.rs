@@ -7,9 +7,12 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
 
 use super::image::{LAYER, Use, change};
-use super::instance::{Instance, device_name, open_device};
+use super::instance::{DeviceRequest, Instance, device_name, open_device};
+use crate::gpu::Shared;
 use crate::memory::{GpuAllocator, MemorySource};
-use crate::{Gpu, OwnImage, Synchronization};
+use crate::pipelines::Pipelines;
+use crate::statistics::PassStatistics;
+use crate::{Gpu, Options, OwnImage, Synchronization};
 
 /// Why there is no device, or why it did not do what was asked.
 #[derive(Debug, thiserror::Error)]
@@ -54,6 +57,9 @@ pub struct ContextOptions {
     /// Whether the Khronos validation layer watches: core, synchronization and GPU-assisted. It must be
     /// installed. Messages are collected, see [`Context::messages`].
     pub validation: bool,
+    /// Whether the driver's compiler is to be asked what it makes of passes, see [`Context::statistics`]. It must
+    /// offer `VK_KHR_pipeline_executable_properties`.
+    pub statistics: bool,
 }
 
 /// A device with one queue.
@@ -66,6 +72,7 @@ pub struct Context {
     /// Taken when the context is dropped.
     allocator: Option<Arc<Mutex<Allocator>>>,
     debug_device: Option<ash::ext::debug_utils::Device>,
+    statistics: Option<ash::khr::pipeline_executable_properties::Device>,
     name: String,
     has_timestamps: bool,
     has_synchronization2: bool,
@@ -94,11 +101,21 @@ impl Context {
         let families = unsafe { instance.instance.get_physical_device_queue_family_properties(physical_device) };
         let has_compute = |family: &vk::QueueFamilyProperties| family.queue_flags.contains(vk::QueueFlags::COMPUTE);
         let queue_family = families.iter().position(has_compute).unwrap_or(0);
-        let (device, has_synchronization2) =
-            open_device(&instance.instance, physical_device, &properties, queue_family as u32)?;
+        let (device, has_synchronization2) = open_device(
+            &instance.instance,
+            &DeviceRequest {
+                physical_device,
+                properties: &properties,
+                queue_family: queue_family as u32,
+                statistics: options.statistics,
+            },
+        )?;
         // SAFETY: the device was made with one queue of that family.
         let queue = unsafe { device.get_device_queue(queue_family as u32, 0) };
         let debug_device = options.validation.then(|| ash::ext::debug_utils::Device::new(&instance.instance, &device));
+        let statistics = options
+            .statistics
+            .then(|| ash::khr::pipeline_executable_properties::Device::new(&instance.instance, &device));
         let mut context = Self {
             physical_device,
             device,
@@ -107,6 +124,7 @@ impl Context {
             command_pool: vk::CommandPool::null(),
             allocator: None,
             debug_device,
+            statistics,
             name: device_name(&properties),
             has_timestamps: families[queue_family].timestamp_valid_bits > 0,
             has_synchronization2,
@@ -147,6 +165,22 @@ impl Context {
     /// Names and labels for debuggers, when the validation layer watches.
     pub fn debug_utils(&self) -> Option<ash::ext::debug_utils::Device> {
         self.debug_device.clone()
+    }
+
+    /// What the driver's compiler makes of each pass: registers, instructions and the like, in the driver's own terms.
+    /// Makes pipelines and nothing else, so that drivers which only pretend to have a device can be asked. Nothing
+    /// unless [`ContextOptions::statistics`] asked for it.
+    ///
+    /// # Errors
+    ///
+    /// [`OffscreenError::Denoiser`].
+    pub fn statistics(&self, core: &limpid::Denoiser) -> Result<Vec<PassStatistics>, OffscreenError> {
+        let Some(extension) = &self.statistics else { return Ok(Vec::new()) };
+        let mut shared = Shared::new(self.gpu(), self.memory(), self.synchronization(), self.debug_utils())?;
+        shared.statistics = Some(extension.clone());
+        let pipelines = Pipelines::new(&Arc::new(shared), core.plan(), core.kernels(), &Options::default())?;
+        let passes = pipelines.passes.iter().map(|pipeline| pipeline.statistics(extension));
+        Ok(passes.collect::<Result<Vec<_>, _>>()?.concat())
     }
 
     /// The device, for [`Denoiser::new`](crate::Denoiser::new).
@@ -330,10 +364,8 @@ impl Context {
 
 impl Drop for Context {
     fn drop(&mut self) {
-        // SAFETY: waits for the device, then destroys in reverse order. Denoisers and images are gone by contract.
+        // SAFETY: whatever was submitted was waited for. Denoisers and images are gone by contract.
         unsafe {
-            // A lost device has nothing to wait for.
-            let _ = self.device.device_wait_idle();
             self.device.destroy_command_pool(self.command_pool, None);
             drop(self.allocator.take());
             self.device.destroy_device(None);

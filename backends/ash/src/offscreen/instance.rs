@@ -122,21 +122,35 @@ impl Instance {
     }
 }
 
+/// What device to open, and how.
+pub(super) struct DeviceRequest<'a> {
+    pub(super) physical_device: vk::PhysicalDevice,
+    pub(super) properties: &'a vk::PhysicalDeviceProperties,
+    pub(super) queue_family: u32,
+    /// Whether pipelines can be asked what the compiler made of them.
+    pub(super) statistics: bool,
+}
+
+fn has_extension(instance: &ash::Instance, device: vk::PhysicalDevice, name: &CStr) -> Result<bool, OffscreenError> {
+    // SAFETY: the physical device is of this instance.
+    let found = unsafe { instance.enumerate_device_extension_properties(device) };
+    let found = found.map_err(failed("listing extensions"))?;
+    Ok(found.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name)))
+}
+
 /// Opens a device with one queue; also says whether `synchronization2` is enabled.
 pub(super) fn open_device(
     instance: &ash::Instance,
-    physical_device: vk::PhysicalDevice,
-    properties: &vk::PhysicalDeviceProperties,
-    queue_family: u32,
+    request: &DeviceRequest<'_>,
 ) -> Result<(ash::Device, bool), OffscreenError> {
     let mut available13 = vk::PhysicalDeviceVulkan13Features::default();
-    let is_1_3 = properties.api_version >= vk::API_VERSION_1_3;
+    let is_1_3 = request.properties.api_version >= vk::API_VERSION_1_3;
     let mut available = vk::PhysicalDeviceFeatures2::default();
     if is_1_3 {
         available = available.push_next(&mut available13);
     }
     // SAFETY: the physical device is of this instance.
-    unsafe { instance.get_physical_device_features2(physical_device, &mut available) };
+    unsafe { instance.get_physical_device_features2(request.physical_device, &mut available) };
     let basic = available.features;
     let has_synchronization2 = is_1_3 && available13.synchronization2 == vk::TRUE;
     // limpid's own, and what GPU-assisted validation writes its findings with.
@@ -145,13 +159,25 @@ pub(super) fn open_device(
         .fragment_stores_and_atomics(basic.fragment_stores_and_atomics == vk::TRUE)
         .vertex_pipeline_stores_and_atomics(basic.vertex_pipeline_stores_and_atomics == vk::TRUE);
     let mut enabled13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(has_synchronization2);
-    let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];
+    let mut statistics =
+        vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
+    let queues =
+        [vk::DeviceQueueCreateInfo::default().queue_family_index(request.queue_family).queue_priorities(&[1.0])];
+    let extensions = [ash::khr::pipeline_executable_properties::NAME.as_ptr()];
     let mut info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&features);
     if is_1_3 {
         info = info.push_next(&mut enabled13);
     }
+    if request.statistics {
+        let name = ash::khr::pipeline_executable_properties::NAME;
+        if !has_extension(instance, request.physical_device, name)? {
+            return Err(crate::Error::Unsupported { what: format!("the extension {}", name.to_string_lossy()) }.into());
+        }
+        info = info.enabled_extension_names(&extensions).push_next(&mut statistics);
+    }
     // SAFETY: only what is available is enabled.
-    let device = unsafe { instance.create_device(physical_device, &info, None) }.map_err(failed("opening a device"))?;
+    let device =
+        unsafe { instance.create_device(request.physical_device, &info, None) }.map_err(failed("opening a device"))?;
     Ok((device, has_synchronization2))
 }
 

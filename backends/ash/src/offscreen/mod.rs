@@ -6,6 +6,7 @@ mod image;
 mod instance;
 mod session;
 
+pub use crate::statistics::PassStatistics;
 pub use context::{Context, ContextOptions, OffscreenError};
 pub use image::UploadedImage;
 pub use instance::device_names;

@@ -4,7 +4,7 @@ use glam::UVec2;
 use limpid::{FrameInputs, Settings};
 use limpid_ash::ash::vk::Format;
 use limpid_ash::offscreen::{Context, ContextOptions, OffscreenError, Session, UploadedImage, UploadedInputs};
-use limpid_ash::{Denoiser, Options, Synchronization};
+use limpid_ash::{Denoiser, Options, SpirvSource, Synchronization};
 
 use super::Executor;
 use crate::{Image, Snapshot, TexelFormat};
@@ -18,6 +18,8 @@ pub struct AshOptions {
     pub validation: bool,
     /// Whether barriers are those of Vulkan 1.0 although the device knows better ones.
     pub old_barriers: bool,
+    /// What kernels are compiled by in the place of limpid.
+    pub spirv: Option<SpirvSource>,
 }
 
 /// The ash backend.
@@ -43,13 +45,14 @@ impl Ash {
     ///
     /// When there is none, or no validation layer.
     pub fn try_open(options: &AshOptions) -> Result<Self, OffscreenError> {
-        let context =
-            Context::open(&ContextOptions { device: options.device.clone(), validation: options.validation })?;
+        let (device, validation) = (options.device.clone(), options.validation);
+        let context = Context::open(&ContextOptions { device, validation, ..ContextOptions::default() })?;
         let synchronization = if options.old_barriers { Synchronization::Core1_0 } else { context.synchronization() };
         let denoiser_options = Options {
             readable_intermediates: true,
             timestamps: options.validation && context.has_timestamps(),
             synchronization,
+            spirv: options.spirv.clone(),
             ..Options::default()
         };
         Ok(Self { session: None, options: denoiser_options, context: Rc::new(context) })
