@@ -5,6 +5,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use glam::UVec2;
+use limpid::Preset;
 use limpid::kernel::Kernel;
 use limpid::resource::Copy;
 use limpid::settings::Fallback;
@@ -46,7 +47,7 @@ fn compare(a: &[Snapshot], b: &[Snapshot], tally: &mut Tally) -> Result<(), Stri
     for (frame, (a, b)) in a.iter().zip(b).enumerate() {
         let mut table = Table::default();
         table.add(a, b);
-        let pixels = a.0["signal"].len() / 2;
+        let pixels = Table::pixels(a);
         let decisions = Table::decisions(a, b).len();
         if decisions > MAX_DECISIONS.max((MAX_DECISION_SHARE * pixels as f64) as usize) {
             return Err(format!("frame {frame}: {decisions} decisions of {pixels}"));
@@ -167,7 +168,7 @@ fn what_was_found_before() {
     // The direction to a surface so near that the square of its distance is 0 was not a number.
     let mut near = Spec {
         size: UVec2::ONE,
-        settings: Default::default(),
+        settings: Preset::Reference.settings(),
         later_settings: None,
         frames: vec![FrameSpec { depth: Field::Constant(1e-30), ..CALM }],
     };
@@ -189,7 +190,7 @@ fn what_was_found_before() {
 }
 
 /// Moving, noisy surfaces of all kinds, as the teeth of the comparison bite into.
-fn lively() -> Spec {
+fn lively(preset: Preset) -> Spec {
     let frame = |seed| FrameSpec {
         seed,
         radiance: Field::Noise(0.1, 3.0),
@@ -201,13 +202,14 @@ fn lively() -> Spec {
         camera_shift: seed as f32 * 0.01,
         ..CALM
     };
-    let mut settings = limpid::Settings::default();
+    let mut settings = preset.settings();
+    settings.coverage.roughness_threshold = 1.0;
     settings.conventions.depth = limpid::settings::DepthEncoding::Linear;
     Spec { size: UVec2::new(72, 40), settings, later_settings: None, frames: (0..5).map(frame).collect() }
 }
 
-fn run_with(change: impl FnOnce(&mut limpid::Settings)) -> Vec<Snapshot> {
-    let mut spec = lively();
+fn run_with(preset: Preset, change: impl FnOnce(&mut limpid::Settings)) -> Vec<Snapshot> {
+    let mut spec = lively(preset);
     change(&mut spec.settings);
     spec.case().run(&mut Cpu::new())
 }
@@ -218,33 +220,39 @@ fn is_caught(a: &[Snapshot], b: &[Snapshot]) -> bool {
 
 #[test]
 fn a_wrong_sign_of_motion_is_caught() {
-    let run = |scale: f32| {
-        run_with(|settings| {
-            settings.conventions.motion_scale *= scale;
-            // No cosine is above 1: history is found by motion vectors alone, whatever its colour.
-            settings.reproject.parallax_normal_cosine = 1.0;
-            settings.reproject.surface_color_gate = 10_000.0;
-        })
-    };
-    assert!(!is_caught(&run(1.0), &run(1.0)));
-    assert!(is_caught(&run(1.0), &run(-1.0)));
+    for preset in [Preset::Default, Preset::Reference] {
+        let run = |scale: f32| {
+            run_with(preset, |settings| {
+                settings.conventions.motion_scale *= scale;
+                // History is found by motion vectors alone, whatever its colour.
+                settings.features.mirror_parallax = false;
+                settings.reproject.surface_color_gate = 10_000.0;
+            })
+        };
+        assert!(!is_caught(&run(1.0), &run(1.0)));
+        assert!(is_caught(&run(1.0), &run(-1.0)));
+    }
 }
 
 #[test]
 fn swapped_history_is_caught() {
-    let case = lively().case();
-    let right = case.run(&mut Cpu::new());
-    for resource in ["guide", "signal"] {
-        let (mut plan, kernels) = limpid::Plan::new(&case.settings, case.size).unwrap();
-        let passes = plan.passes.iter_mut().filter(|pass| pass.kernel == "reproject");
-        for bound in passes.flat_map(|pass| &mut pass.bindings).filter(|bound| bound.resource == resource) {
-            bound.copy = match bound.copy {
-                Copy::Current => Copy::Previous,
-                Copy::Previous => Copy::Current,
-            };
+    for (preset, kernel, history) in
+        [(Preset::Default, "accumulate", "history"), (Preset::Reference, "reproject", "signal")]
+    {
+        let case = lively(preset).case();
+        let right = case.run(&mut Cpu::new());
+        for resource in ["guide", history] {
+            let (mut plan, kernels) = limpid::Plan::new(&case.settings, case.size).unwrap();
+            let passes = plan.passes.iter_mut().filter(|pass| pass.kernel == kernel);
+            for bound in passes.flat_map(|pass| &mut pass.bindings).filter(|bound| bound.resource == resource) {
+                bound.copy = match bound.copy {
+                    Copy::Current => Copy::Previous,
+                    Copy::Previous => Copy::Current,
+                };
+            }
+            let core = limpid::Denoiser::with_plan(&case.settings, plan, kernels);
+            assert!(is_caught(&right, &case.run_plan(&mut Cpu::new(), core)), "{resource}");
         }
-        let core = limpid::Denoiser::with_plan(&case.settings, plan, kernels);
-        assert!(is_caught(&right, &case.run_plan(&mut Cpu::new(), core)), "{resource}");
     }
 }
 
@@ -272,7 +280,8 @@ fn without_barriers(kernel: &Kernel) -> Kernel {
 
 #[test]
 fn a_missing_workgroup_barrier_is_caught() {
-    let case = lively().case();
+    // Kernels of the other pipeline have no workgroup memory.
+    let case = lively(Preset::Reference).case();
     let (plan, kernels) = limpid::Plan::new(&case.settings, case.size).unwrap();
     for wrong in ["reproject", "resolve_temporal"] {
         let broken = |kernel: &Kernel| if kernel.name == wrong { without_barriers(kernel) } else { kernel.clone() };
@@ -284,24 +293,33 @@ fn a_missing_workgroup_barrier_is_caught() {
     }
 }
 
-#[test]
-fn a_constant_that_is_one_percent_off_is_caught() {
-    let right = run_with(|_| ());
+/// Which settings change bits when they are one percent off, and which of those would be noticed between devices.
+fn noticed(preset: Preset, groups: &[&str]) -> (usize, Vec<&'static str>) {
+    let right = run_with(preset, |_| ());
     let (mut differing, mut caught) = (0, Vec::new());
-    for number in limpid::Settings::numbers() {
+    for number in limpid::Settings::numbers().filter(|n| groups.iter().any(|group| n.path.starts_with(group))) {
         let value = number.default * 1.01;
         let value = if value > number.high { number.default * 0.99 } else { value };
-        let wrong = run_with(|settings| *settings = set_number(settings, number, value));
+        let wrong = run_with(preset, |settings| *settings = set_number(settings, number, value));
         differing += usize::from(check_identical(&right, &wrong).is_err());
         if is_caught(&right, &wrong) {
             caught.push(number.path);
         }
     }
     println!("{differing} constants change bits; between different devices these would be noticed: {caught:?}");
+    (differing, caught)
+}
+
+#[test]
+fn a_constant_that_is_one_percent_off_is_caught() {
+    let (differing, caught) = noticed(Preset::Reference, &["reproject.", "prefilter.", "resolve."]);
     // The others decide at thresholds that this scene does not come near to.
     assert!(differing >= 15);
     for path in ["reproject.neighborhood_falloff", "prefilter.normal_power", "resolve.stability", "resolve.clip_scale"]
     {
         assert!(caught.contains(&path), "{path}");
     }
+    let (differing, caught) = noticed(Preset::Default, &["accumulate.", "footprint."]);
+    assert!(differing >= 5);
+    assert!(caught.contains(&"footprint.filter_scale"));
 }

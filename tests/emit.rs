@@ -3,7 +3,7 @@
 use glam::UVec2;
 use limpid::emit::{Checks, GlslDialect, GlslOptions, HlslOptions, MslOptions, ShaderModel, SpirvOptions, WgslOptions};
 use limpid::kernel::Kernel;
-use limpid::{Error, Plan, Settings};
+use limpid::{Error, Plan, Preset, Settings};
 use proptest::prelude::*;
 
 mod any_settings;
@@ -79,7 +79,7 @@ proptest! {
 
 #[test]
 fn comments_and_names_are_those_of_the_sources() {
-    let (_, kernels) = Plan::new(&Settings::default(), UVec2::new(64, 64)).unwrap();
+    let (_, kernels) = Plan::new(&Preset::Reference.settings(), UVec2::new(64, 64)).unwrap();
     let prefilter = kernels.iter().find(|kernel| kernel.name == "prefilter").unwrap();
     let text = prefilter.hlsl(&HlslOptions::default()).unwrap();
     for part in [

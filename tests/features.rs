@@ -2,7 +2,7 @@
 
 use glam::UVec2;
 use limpid::emit::SpirvOptions;
-use limpid::settings::Features;
+use limpid::settings::{Features, Pipeline};
 use limpid::{Error, Plan, Settings};
 use limpid_harness::strategy::noise;
 use limpid_harness::{Case, Executor, Pixel, Snapshot, fastest};
@@ -12,20 +12,39 @@ const SIZE: UVec2 = UVec2::new(64, 40);
 /// A change of features.
 type Change = fn(&mut Features);
 
-/// Each feature switched off, by name.
-const OFF: &[(&str, Change)] = &[
+/// Each feature that both pipelines have switched off, by name.
+const OFF: [(&str, Change); 5] = [
     ("mirror_parallax", |features| features.mirror_parallax = false),
     ("surface_motion", |features| features.surface_motion = false),
-    ("history_search", |features| features.history_search = false),
-    ("edge_repair", |features| features.edge_repair = false),
     ("spatial_filter", |features| features.spatial_filter = false),
     ("history_clip", |features| features.history_clip = false),
-    ("average_mixing", |features| features.average_mixing = false),
     ("constant_roughness", |features| features.constant_roughness = Some(0.3)),
 ];
 
-fn with(changes: &[Change]) -> Settings {
+/// Those that one of them has besides.
+fn off(pipeline: Pipeline) -> Vec<(&'static str, Change)> {
+    let published: [(&str, Change); 3] = [
+        ("history_search", |features| features.history_search = false),
+        ("edge_repair", |features| features.edge_repair = false),
+        ("average_mixing", |features| features.average_mixing = false),
+    ];
+    let footprint: [(&str, Change); 4] = [
+        ("light_change", |features| features.light_change = false),
+        ("outlier_spread", |features| features.outlier_spread = false),
+        ("wide_filter", |features| features.wide_filter = false),
+        ("near_taps", |features| features.near_taps = 0),
+    ];
+    let own: &[_] = if pipeline == Pipeline::Published { &published } else { &footprint };
+    OFF.iter().chain(own).copied().collect()
+}
+
+fn find(pipeline: Pipeline, name: &str) -> Change {
+    off(pipeline).into_iter().find(|(n, _)| *n == name).unwrap().1
+}
+
+fn with(pipeline: Pipeline, changes: &[Change]) -> Settings {
     let mut settings = Settings::default();
+    settings.pipeline = pipeline;
     changes.iter().for_each(|change| change(&mut settings.features));
     settings
 }
@@ -66,17 +85,20 @@ impl Cost {
 
 #[test]
 fn what_is_off_costs_nothing() {
-    let everything = Cost::of(&with(&[]));
-    for (name, off) in OFF {
-        let without = Cost::of(&with(&[*off]));
-        println!("{name}: {} of {} words, {} bytes", without.words(), everything.words(), without.bytes);
-        assert!(without.is_within(&everything), "{name}: {without:?} and {everything:?}");
-        assert!(without.words() < everything.words(), "{name}");
-        // On top of each other too.
-        for (other_name, other) in OFF {
-            let settings = with(&[*off, *other]);
-            if settings.validate().is_ok() {
-                assert!(Cost::of(&settings).is_within(&without), "{name} and {other_name}");
+    for pipeline in [Pipeline::Footprint, Pipeline::Published] {
+        let everything = Cost::of(&with(pipeline, &[]));
+        for (name, change) in off(pipeline) {
+            let without = Cost::of(&with(pipeline, &[change]));
+            println!("{name}: {} of {} words, {} bytes", without.words(), everything.words(), without.bytes);
+            assert!(without.is_within(&everything), "{name}: {without:?} and {everything:?}");
+            // The number of taps is a number.
+            assert!(without.words() < everything.words() || name == "near_taps", "{name}");
+            // On top of each other too.
+            for (other_name, other) in off(pipeline) {
+                let settings = with(pipeline, &[change, other]);
+                if settings.validate().is_ok() {
+                    assert!(Cost::of(&settings).is_within(&without), "{name} and {other_name}");
+                }
             }
         }
     }
@@ -84,7 +106,7 @@ fn what_is_off_costs_nothing() {
 
 #[test]
 fn no_way_to_find_history_is_refused() {
-    let settings = with(&[OFF[0].1, OFF[1].1]);
+    let settings = with(Pipeline::Footprint, &[OFF[0].1, OFF[1].1]);
     let error = Plan::new(&settings, SIZE).unwrap_err();
     assert!(matches!(error, Error::Features { .. }) && error.to_string().contains("surface_motion"), "{error}");
     let mut settings = Settings::default();
@@ -115,30 +137,55 @@ fn assert_same(name: &str, full: &[Snapshot], reduced: &[Snapshot]) {
     }
 }
 
+/// A still wall for the published pipeline.
+fn published(roughness: f32) -> Case {
+    let mut case = wall(roughness);
+    case.settings.pipeline = Pipeline::Published;
+    case
+}
+
 #[test]
 fn what_a_scene_does_not_use_changes_nothing() {
     let executor = &mut *fastest();
-    let rough = wall(0.3);
+    let rough = published(0.3);
     let full = run(&rough, executor, &[]);
     // Seen straight on, the reflected point is found where the surface is, and every history fits.
     for name in ["surface_motion", "history_search", "edge_repair", "constant_roughness"] {
-        let (_, off) = OFF.iter().find(|(n, _)| *n == name).unwrap();
-        assert_same(name, &full, &run(&rough, executor, &[*off]));
+        assert_same(name, &full, &run(&rough, executor, &[find(Pipeline::Published, name)]));
     }
     // Mirrors are not filtered.
-    let mirror = wall(0.005);
-    let (_, off) = OFF[4];
-    assert_same("spatial_filter", &run(&mirror, executor, &[]), &run(&mirror, executor, &[off]));
+    let mirror = published(0.005);
+    let no_filter = find(Pipeline::Published, "spatial_filter");
+    assert_same("spatial_filter", &run(&mirror, executor, &[]), &run(&mirror, executor, &[no_filter]));
     // No cosine is above 1.
-    let mut by_motion = wall(0.3);
+    let mut by_motion = published(0.3);
     by_motion.settings.reproject.parallax_normal_cosine = 1.0;
-    assert_same("mirror_parallax", &run(&by_motion, executor, &[]), &run(&by_motion, executor, &[OFF[0].1]));
+    let no_parallax = find(Pipeline::Published, "mirror_parallax");
+    assert_same("mirror_parallax", &run(&by_motion, executor, &[]), &run(&by_motion, executor, &[no_parallax]));
     // A box that holds everything clips nothing.
-    let mut roomy = wall(0.3);
+    let mut roomy = published(0.3);
     roomy.settings.resolve.clip_extent_floor = 60_000.0;
-    assert_same("history_clip", &run(&roomy, executor, &[]), &run(&roomy, executor, &[OFF[5].1]));
+    let no_clip = find(Pipeline::Published, "history_clip");
+    assert_same("history_clip", &run(&roomy, executor, &[]), &run(&roomy, executor, &[no_clip]));
     // The comparison notices what is used.
-    let (_, off) = OFF[4];
-    let filtered = run(&rough, executor, &[off]);
+    let filtered = run(&rough, executor, &[no_filter]);
+    assert!(full.iter().zip(&filtered).any(|(a, b)| a.output() != b.output()));
+}
+
+#[test]
+fn what_a_scene_does_not_use_changes_nothing_over_footprints() {
+    let executor = &mut *fastest();
+    let rough = wall(0.3);
+    let full = run(&rough, executor, &[]);
+    // History of surfaces this rough is not clipped, and the input has no outliers and no change of light.
+    for name in ["history_clip", "outlier_spread", "light_change", "constant_roughness"] {
+        assert_same(name, &full, &run(&rough, executor, &[find(Pipeline::Footprint, name)]));
+    }
+    // Footprints of mirrors are no wider than a pixel: what the blocks add is how much of a difference is noise.
+    let mirror = wall(0.005);
+    let full = run(&mirror, executor, &[]);
+    assert_same("outlier_spread", &full, &run(&mirror, executor, &[find(Pipeline::Footprint, "outlier_spread")]));
+    // The comparison notices what is used.
+    let filtered = run(&rough, executor, &[find(Pipeline::Footprint, "wide_filter")]);
     assert!(full.iter().zip(&filtered).any(|(a, b)| a.output() != b.output()));
 }

@@ -50,8 +50,10 @@ fn constant_radiance_stays_what_it_is() {
         for output in case.run(executor).iter().map(Snapshot::output) {
             for texel in output {
                 for (out, expected) in texel.into_iter().zip(radiance) {
-                    // Rounded when it is stored as input, history, average and output, and by the clip's floor.
-                    let allowed = 4.0 * HALF_STEP * expected + 0.0011;
+                    // Rounded when it is stored as input, history, average and output, and by the clip's floor; blocks
+                    // keep 9 bits of the largest of the three.
+                    let block = if is_reference { 0.0 } else { r.max(g).max(b) / 512.0 };
+                    let allowed = 4.0 * HALF_STEP * expected + 0.0011 + block;
                     prop_assert!((out - expected).abs() <= allowed, "{} became {}", expected, out);
                 }
             }

@@ -7,7 +7,7 @@ use limpid::emit::{Checks, SpirvOptions, SpirvVersion};
 use limpid::kernel::{BindingKind, Kernel, Overrides, names};
 use limpid::plan::{Grid, Stage};
 use limpid::resource::{Access, Kind};
-use limpid::settings::{Fallback, RayList};
+use limpid::settings::{Fallback, Pipeline, RayList};
 use limpid::synchronization::Usage;
 use limpid::{Camera, Denoiser, Error, FrameInputs, Plan, Preset, Settings};
 use proptest::prelude::*;
@@ -70,10 +70,18 @@ proptest! {
         // What is off leaves nothing behind.
         let features = &settings.features;
         prop_assert_eq!(plan.inputs().any(|i| i == "motion"), features.surface_motion);
+        let is_published = settings.pipeline == Pipeline::Published;
+        let has_pass = |kernel: &str| plan.passes.iter().any(|pass| pass.kernel == kernel);
         prop_assert_eq!(plan.inputs().any(|i| i == "roughness"), features.constant_roughness.is_none());
-        prop_assert_eq!(plan.passes.iter().any(|pass| pass.kernel == "prefilter"), features.spatial_filter);
-        let uses_average = features.spatial_filter || features.history_clip || features.average_mixing;
+        prop_assert_eq!(has_pass("prefilter"), is_published && features.spatial_filter);
+        let uses_average = is_published && (features.spatial_filter || features.history_clip || features.average_mixing);
         prop_assert_eq!(plan.resource("average").is_some(), uses_average);
+        prop_assert_eq!(plan.resource("light").is_some(), !is_published && features.light_change);
+        let spreads = usize::from(features.outlier_spread) + usize::from(features.spatial_filter && features.wide_filter);
+        let planned = plan.passes.iter().filter(|pass| pass.kernel == "block_spread").count();
+        prop_assert_eq!(planned, if is_published { 0 } else { spreads });
+        let names: HashSet<_> = plan.passes.iter().map(|pass| &pass.name).collect();
+        prop_assert_eq!(names.len(), plan.passes.len());
         prop_assert_eq!(plan.resource("rays").is_some(), settings.coverage.ray_list.is_some());
         prop_assert_eq!(plan.inputs().any(|i| i == "environment"), settings.coverage.fallback == Fallback::Environment);
     }
@@ -90,8 +98,10 @@ proptest! {
 
 #[test]
 fn the_plan_as_text() {
-    let (plan, _) = Plan::new(&Settings::default(), SIZE).unwrap();
-    insta::assert_snapshot!(plan);
+    for (name, preset) in Preset::ALL {
+        let (plan, _) = Plan::new(&preset.settings(), SIZE).unwrap();
+        insta::assert_snapshot!(*name, plan);
+    }
 }
 
 #[test]
@@ -106,7 +116,7 @@ fn memory_stays_within_the_published_figure() {
 
 #[test]
 fn every_hazard_has_a_barrier() {
-    let mut settings = Settings::default();
+    let mut settings = Preset::Reference.settings();
     settings.coverage.ray_list = Some(RayList::default());
     let (plan, _) = Plan::new(&settings, SIZE).unwrap();
     let barriers = plan.dependencies();
@@ -146,9 +156,9 @@ fn the_tracer_runs_between_the_stages() {
 
 #[test]
 fn kernels_are_all_used() {
-    let (plan, _) = Plan::new(&Settings::default(), SIZE).unwrap();
-    let planned: HashSet<_> = plan.passes.iter().map(|pass| pass.kernel.as_str()).collect();
-    assert_eq!(planned, names().collect());
+    let plans = Preset::ALL.iter().map(|(_, preset)| Plan::new(&preset.settings(), SIZE).unwrap().0);
+    let planned: HashSet<_> = plans.flat_map(|plan| plan.passes).map(|pass| pass.kernel).collect();
+    assert_eq!(planned, names().map(str::to_owned).collect());
     assert!(Kernel::new("no_such_kernel", &Overrides::new()).is_err());
 }
 

@@ -4,7 +4,7 @@ use glam::UVec2;
 use limpid::plan::{Bound, Grid, Pass, Stage};
 use limpid::resource::{Access, Copy, Count, Kind, Lifetime, Resource};
 use limpid::synchronization::{Barrier, Usage};
-use limpid::{Plan, Settings};
+use limpid::{Plan, Preset, Settings};
 use proptest::prelude::*;
 
 /// Frames that hazards are looked for in, with the same barriers in each.
@@ -209,10 +209,14 @@ proptest! {
 
 #[test]
 fn limpids_own_barriers() {
-    let (plan, _) = Plan::new(&Settings::default(), UVec2::splat(64)).unwrap();
+    let (plan, _) = Plan::new(&Preset::Reference.settings(), UVec2::splat(64)).unwrap();
     check(&plan).unwrap();
     let passes: Vec<_> =
         plan.passes.iter().zip(plan.barriers()).filter(|(_, b)| b.is_some()).map(|(p, _)| p.kernel.as_str()).collect();
+    // Passes over blocks wait for each other; `fill` and the second average wait for the same barrier.
+    let (plan, _) = Plan::new(&Settings::default(), UVec2::splat(64)).unwrap();
+    check(&plan).unwrap();
+    assert_eq!(plan.barriers().iter().flatten().count(), 8);
     // `fill` only needs what came before `reproject` and runs beside `prefilter`.
     assert_eq!(passes, ["classify", "indirect_args", "reproject", "prefilter", "resolve_temporal"]);
 }

@@ -4,16 +4,16 @@
 use glam::UVec2;
 use limpid::plan::Plan;
 use limpid::resource::{Access, Copy};
-use limpid::settings::{Fallback, RayList};
-use limpid::{Denoiser, Settings};
+use limpid::settings::{Fallback, Pipeline, RayList};
+use limpid::{Denoiser, Preset, Settings};
 use limpid_harness::executor::{Ash, AshOptions};
 use limpid_harness::strategy::noise;
 use limpid_harness::{Case, Change, Pixel, skip};
 
 const SIZE: UVec2 = UVec2::new(40, 24);
 
-fn open(old_barriers: bool) -> Option<Ash> {
-    let options = AshOptions { validation: true, old_barriers, ..AshOptions::default() };
+fn open(old_barriers: bool, shared_memory: bool) -> Option<Ash> {
+    let options = AshOptions { validation: true, old_barriers, shared_memory, ..AshOptions::default() };
     Ash::try_open(&options).map_err(|error| skip(&error.to_string())).ok()
 }
 
@@ -30,16 +30,18 @@ fn assert_silent(ash: &Ash) {
 #[test]
 fn frames_sizes_and_settings_change_without_a_message() {
     for old_barriers in [false, true] {
-        let Some(mut ash) = open(old_barriers) else { return };
-        let mut case = Case::still(SIZE, 8, noisy);
+        let Some(mut ash) = open(old_barriers, !old_barriers) else { return };
+        let mut case = Case::still(SIZE, 10, noisy);
         case.settings.coverage.ray_list = Some(RayList::default());
         case.steps[2].frame.size = UVec2::new(17, 23);
         case.steps[3].change = Change::Resize(UVec2::new(64, 33));
         let mut other = case.settings.clone();
         other.coverage.fallback = Fallback::Environment;
         case.steps[5].change = Change::Settings(Box::new(other.clone()));
-        other.resolve.stability = 0.2;
-        case.steps[6].change = Change::Settings(Box::new(other));
+        other.footprint.filter_scale = 0.2;
+        case.steps[6].change = Change::Settings(Box::new(other.clone()));
+        other.pipeline = Pipeline::Published;
+        case.steps[8].change = Change::Settings(Box::new(other));
         case.run(&mut ash);
         assert_silent(&ash);
         // What is kept for frames in flight is freed with the rest.
@@ -50,15 +52,22 @@ fn frames_sizes_and_settings_change_without_a_message() {
 
 #[test]
 fn a_frame_has_few_barriers_and_its_passes_have_times() {
-    let Some(mut ash) = open(false) else { return };
-    Case::still(SIZE, 3, noisy).run(&mut ash);
-    let denoiser = ash.denoiser().unwrap();
-    let recorded = denoiser.recorded();
-    // Five between passes and one for whoever reads the output.
-    assert_eq!((recorded.dispatches, recorded.barriers, recorded.descriptor_writes), (6, 6, 5));
-    let times = denoiser.read_times().unwrap().expect("the device has finished");
-    assert!(times.iter().map(|time| time.kernel.as_str()).eq(denoiser.plan().passes.iter().map(|p| p.kernel.as_str())));
-    assert!(times.iter().any(|time| !time.duration.is_zero()));
+    for (preset, dispatches, barriers, descriptor_writes) in [(Preset::Default, 10, 9, 5), (Preset::Reference, 6, 6, 5)]
+    {
+        let Some(mut ash) = open(false, false) else { return };
+        let mut case = Case::still(SIZE, 3, noisy);
+        case.settings.pipeline = preset.settings().pipeline;
+        case.run(&mut ash);
+        let denoiser = ash.denoiser().unwrap();
+        let recorded = denoiser.recorded();
+        // One of them for whoever reads the output.
+        let counts = (recorded.dispatches, recorded.barriers, recorded.descriptor_writes);
+        assert_eq!(counts, (dispatches, barriers, descriptor_writes));
+        let times = denoiser.read_times().unwrap().expect("the device has finished");
+        let passes = denoiser.plan().passes.iter().map(|pass| pass.name.as_str());
+        assert!(times.iter().map(|time| time.kernel.as_str()).eq(passes));
+        assert!(times.iter().any(|time| !time.duration.is_zero()));
+    }
 }
 
 /// A plan in which two transient textures are not used at the same time.
@@ -75,8 +84,9 @@ fn sharing_plan(settings: &Settings) -> Denoiser {
 
 #[test]
 fn shared_memory_changes_nothing() {
-    let Some(mut ash) = open(false) else { return };
-    let case = Case::still(SIZE, 5, |frame, p| Pixel { depth: 4.0, ..noisy(frame, p) });
+    let Some(mut ash) = open(false, true) else { return };
+    let mut case = Case::still(SIZE, 5, |frame, p| Pixel { depth: 4.0, ..noisy(frame, p) });
+    case.settings.pipeline = Pipeline::Published;
     let own = case.run(&mut ash);
     let bytes = ash.denoiser().unwrap().allocated_bytes();
     let core = sharing_plan(&case.settings);
@@ -93,8 +103,9 @@ fn shared_memory_changes_nothing() {
 /// The layer has to find what is missing, or its silence means nothing.
 #[test]
 fn a_missing_barrier_is_reported() {
-    let Some(mut ash) = open(false) else { return };
-    let case = Case::still(SIZE, 3, noisy);
+    let Some(mut ash) = open(false, false) else { return };
+    let mut case = Case::still(SIZE, 3, noisy);
+    case.settings.pipeline = Pipeline::Published;
     let (mut plan, kernels) = Plan::new(&case.settings, SIZE).unwrap();
     // The plan says that prefilter writes nothing, so resolve_temporal does not wait for it.
     let prefilter = plan.passes.iter_mut().find(|pass| pass.kernel == "prefilter").unwrap();

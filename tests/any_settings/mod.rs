@@ -1,7 +1,7 @@
 //! Settings that change code or bindings, at random.
 
 use limpid::Settings;
-use limpid::settings::{Channel, Fallback, NormalEncoding, RayList, RaysPerQuad, RoughnessEncoding};
+use limpid::settings::{Channel, Fallback, NormalEncoding, Pipeline, RayList, RaysPerQuad, RoughnessEncoding};
 use limpid_harness::strategy::any_features;
 use proptest::prelude::*;
 
@@ -16,9 +16,11 @@ pub(crate) fn any_settings() -> impl Strategy<Value = Settings> {
         prop::sample::select(vec![Fallback::Black, Fallback::Input, Fallback::Environment]),
         ray_list,
         any_features(),
+        prop::sample::select(vec![Pipeline::Footprint, Pipeline::Published]),
     )
-        .prop_map(|(normal, channel, roughness, fallback, ray_list, features)| {
+        .prop_map(|(normal, channel, roughness, fallback, ray_list, features, pipeline)| {
             let mut settings = Settings::default();
+            settings.pipeline = pipeline;
             settings.features = features;
             settings.conventions.normal = normal;
             settings.conventions.roughness_channel = channel;

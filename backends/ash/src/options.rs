@@ -24,7 +24,8 @@ pub struct Options {
     pub synchronization: Synchronization,
     /// Measures each pass; see [`Denoiser::read_times`](crate::Denoiser::read_times).
     pub timestamps: bool,
-    /// Lets intermediate images and buffers be copied from, to inspect them.
+    /// Lets intermediate images and buffers be copied from after the frame, to inspect them: each has memory of its
+    /// own then.
     pub readable_intermediates: bool,
     /// Where pipelines are looked for and stored, or null.
     pub pipeline_cache: vk::PipelineCache,

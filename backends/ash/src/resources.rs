@@ -325,7 +325,10 @@ impl Resources {
             entries.push(create(gpu, resource, plan.size, options)?);
         }
         let mut resources = Self { entries, shared_images: Vec::new(), bytes: 0 };
-        for slot in plan.memory_slots() {
+        let slots = plan.memory_slots();
+        // What is to be read after the frame must still be there.
+        let own = || slots.iter().flatten().map(|&index| vec![index]).collect();
+        for slot in if options.readable_intermediates { own() } else { slots.clone() } {
             resources.place_slot(gpu, plan, &slot)?;
         }
         for (resource, entry) in plan.resources.iter().zip(&mut resources.entries) {

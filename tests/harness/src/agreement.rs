@@ -54,6 +54,38 @@ fn is_denoised(snapshot: &Snapshot, pixel: usize) -> bool {
     f32::from_bits(snapshot.0["guide"][2 * pixel]) > 0.0
 }
 
+/// Where a pipeline keeps what it accumulated: radiance in three half floats, in the upper half of the second word
+/// history length and other numbers.
+struct Accumulated {
+    resource: &'static str,
+    /// Bits of each of those numbers, the length first.
+    bits: &'static [u32],
+}
+
+impl Accumulated {
+    const ALL: &[Self] = &[
+        // Length and variance.
+        Self { resource: "signal", bits: &[8, 8] },
+        // Length, hit share and noise.
+        Self { resource: "history", bits: &[5, 7, 4] },
+    ];
+
+    /// That of the pipeline which left a snapshot.
+    fn of(snapshot: &Snapshot) -> &'static Self {
+        let found = Self::ALL.iter().find(|accumulated| snapshot.0.contains_key(accumulated.resource));
+        found.expect("every pipeline accumulates")
+    }
+
+    fn fields(&self, word: u32) -> impl Iterator<Item = u32> {
+        let mut rest = word >> 16;
+        self.bits.iter().map(move |bits| {
+            let field = rest & ((1 << bits) - 1);
+            rest >>= bits;
+            field
+        })
+    }
+}
+
 /// Agreement by resource.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table(pub BTreeMap<String, Agreement>);
@@ -69,10 +101,15 @@ impl Table {
         for (name, words) in &a.0 {
             let others = &b.0[name];
             assert_eq!(words.len(), others.len(), "{name}");
-            let is_halves = matches!(name.as_str(), "signal" | "previous signal" | "average" | "output");
+            let accumulated = Accumulated::ALL.iter().find(|accumulated| accumulated.resource == name);
+            let is_halves = accumulated.is_some() || matches!(name.as_str(), "previous signal" | "average" | "output");
+            // Compared in the frame that wrote it.
+            if name == "previous history" {
+                continue;
+            }
             for (index, (&word, &other)) in words.iter().zip(others).enumerate() {
-                // Where nothing is denoised a signal holds what was there before.
-                if name == "signal" && !(is_denoised(a, index / 2) && is_denoised(b, index / 2)) {
+                // Where nothing is denoised it holds what was there before.
+                if accumulated.is_some() && !(is_denoised(a, index / 2) && is_denoised(b, index / 2)) {
                     continue;
                 }
                 let (a, b) = (word, other);
@@ -82,28 +119,35 @@ impl Table {
                     continue;
                 }
                 agreement.add(half_steps(a, b));
-                // The upper half of a signal's second word holds history length and variance, 8 bits each.
-                if name == "signal" && index % 2 == 1 {
-                    let (a, b) = (a >> 16, b >> 16);
-                    let history = self.0.entry("signal history".to_owned()).or_default();
-                    history.add((a & 255).abs_diff(b & 255));
-                    history.add((a >> 8).abs_diff(b >> 8));
-                } else {
-                    agreement.add(half_steps(a >> 16, b >> 16));
+                match accumulated.filter(|_| index % 2 == 1) {
+                    Some(accumulated) => {
+                        let state = self.0.entry(format!("{name} state")).or_default();
+                        for (a, b) in accumulated.fields(a).zip(accumulated.fields(b)) {
+                            state.add(a.abs_diff(b));
+                        }
+                    }
+                    None => agreement.add(half_steps(a >> 16, b >> 16)),
                 }
             }
         }
     }
 
-    /// Pixels whose reprojected history differs by more than two steps of a half float, or in length: where
+    /// Pixels of an image, listed or not.
+    pub fn pixels(snapshot: &Snapshot) -> usize {
+        snapshot.0[Accumulated::of(snapshot).resource].len() / 2
+    }
+
+    /// Pixels whose history differs by more than two steps of a half float, or in length: where
     /// two executors decided differently about what last frame shows there.
     pub fn decisions(a: &Snapshot, b: &Snapshot) -> Vec<usize> {
+        let accumulated = Accumulated::of(a);
+        let length = |word: u32| accumulated.fields(word).next().unwrap_or(0);
         let differs = |(a, b): (&[u32], &[u32])| {
             let radiance = [(a[0], b[0]), (a[0] >> 16, b[0] >> 16), (a[1], b[1])];
-            let length = |word: u32| (word >> 16) & 255;
             radiance.iter().any(|&(a, b)| half_steps(a, b) > 2) || length(a[1]).abs_diff(length(b[1])) > 1
         };
-        let pairs = a.0["signal"].chunks_exact(2).zip(b.0["signal"].chunks_exact(2));
+        let name = accumulated.resource;
+        let pairs = a.0[name].chunks_exact(2).zip(b.0[name].chunks_exact(2));
         let decided = pairs.enumerate().filter(|&(_, pair)| differs(pair)).map(|(index, _)| index);
         decided.filter(|&pixel| is_denoised(a, pixel) && is_denoised(b, pixel)).collect()
     }

@@ -2,21 +2,22 @@ use std::collections::BTreeMap;
 
 use half::f16;
 use limpid::Plan;
-use limpid::resource::{Copy, Kind};
+use limpid::resource::{Copy, Kind, Resource};
 
 /// All resources of limpid after a frame, as words, by name and copy.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Snapshot(pub BTreeMap<String, Vec<u32>>);
 
 impl Snapshot {
-    /// Reads everything that a plan names, by functions that read a texture and a buffer.
+    /// Reads what a plan names and can be read, by functions that read a texture and a buffer.
     pub fn take(
         plan: &Plan,
+        is_readable: impl Fn(&Resource) -> bool,
         mut texture: impl FnMut(&str, Copy) -> Vec<u32>,
         mut buffer: impl FnMut(&str) -> Vec<u32>,
     ) -> Self {
         let mut words = BTreeMap::new();
-        for resource in &plan.resources {
+        for resource in plan.resources.iter().filter(|resource| is_readable(resource)) {
             let name = resource.name.as_str();
             match resource.kind {
                 Kind::Texture { .. } if resource.ping_pong => {

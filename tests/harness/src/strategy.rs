@@ -295,13 +295,15 @@ fn number_value(number: &'static Number) -> impl Strategy<Value = f32> {
 /// Features that make sense together.
 pub fn any_features() -> impl Strategy<Value = Features> {
     let roughness = prop::option::of(select(&[0.0f32, 0.01, 0.447_213_6, 1.0][..]));
-    (prop::array::uniform7(any::<bool>()), roughness).prop_map(|(on, constant_roughness)| {
+    let near_taps = select(&[0u32, 1, 4, 12][..]);
+    (prop::array::uniform10(any::<bool>()), near_taps, roughness).prop_map(|(on, near_taps, constant_roughness)| {
         let mut features = Features::default();
         // One of the two has to be on.
         (features.mirror_parallax, features.surface_motion) = (on[0] || !on[1], on[1]);
         (features.history_search, features.edge_repair, features.spatial_filter) = (on[2], on[3], on[4]);
         (features.history_clip, features.average_mixing) = (on[5], on[6]);
-        features.constant_roughness = constant_roughness;
+        (features.light_change, features.outlier_spread, features.wide_filter) = (on[7], on[8], on[9]);
+        (features.near_taps, features.constant_roughness) = (near_taps, constant_roughness);
         features
     })
 }
@@ -310,7 +312,7 @@ pub fn any_features() -> impl Strategy<Value = Features> {
 pub fn any_settings() -> impl Strategy<Value = Settings> {
     let rays = select(vec![RaysPerQuad::One, RaysPerQuad::Two, RaysPerQuad::Four]);
     let ray_list = prop::option::of((rays, prop::option::of(0.0f32..=1.0)));
-    let preset = select(vec![Preset::Default, Preset::Default, Preset::Reference]);
+    let preset = select(Preset::ALL.iter().map(|(_, preset)| *preset).collect::<Vec<_>>());
     let normal = select(vec![NormalEncoding::Signed, NormalEncoding::Signed, NormalEncoding::Octahedral]);
     let fallback = select(vec![Fallback::Black, Fallback::Input, Fallback::Environment]);
     let roughness =
@@ -327,7 +329,7 @@ pub fn any_settings() -> impl Strategy<Value = Settings> {
                 }
             }
             settings.reproject.min_history_cap = settings.reproject.min_history_cap.min(settings.reproject.max_history);
-            settings.features = features.unwrap_or_default();
+            settings.features = features.unwrap_or(settings.features);
             settings.conventions.depth = DepthEncoding::Linear;
             settings.conventions.normal = normal;
             settings.conventions.roughness = roughness;

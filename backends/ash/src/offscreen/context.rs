@@ -6,7 +6,7 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
 
-use super::image::{LAYER, Use, change};
+use super::image::{LAYER, Use, change, texel_bytes};
 use super::instance::{DeviceRequest, Instance, device_name, open_device};
 use crate::gpu::Shared;
 use crate::memory::{GpuAllocator, MemorySource};
@@ -274,7 +274,7 @@ impl Context {
     ///
     /// [`OffscreenError`].
     pub fn read_image(&self, image: &OwnImage) -> Result<Vec<u8>, OffscreenError> {
-        self.read(u64::from(image.size.x) * u64::from(image.size.y) * 8, |commands, buffer| {
+        self.read(u64::from(image.size.x) * u64::from(image.size.y) * texel_bytes(image.format), |commands, buffer| {
             let region = vk::BufferImageCopy::default().image_subresource(LAYER).image_extent(vk::Extent3D {
                 width: image.size.x,
                 height: image.size.y,

@@ -109,12 +109,12 @@ impl Drop for UploadedImage {
     }
 }
 
-fn texel_bytes(format: vk::Format) -> u64 {
+pub(super) fn texel_bytes(format: vk::Format) -> u64 {
     match format {
-        vk::Format::R32_SFLOAT => 4,
-        vk::Format::R16G16B16A16_SFLOAT | vk::Format::R32G32_SFLOAT => 8,
-        vk::Format::R32G32B32A32_SFLOAT => 16,
-        other => panic!("off-screen images are float, not {other:?}"),
+        vk::Format::R32_SFLOAT | vk::Format::R32_UINT => 4,
+        vk::Format::R16G16B16A16_SFLOAT | vk::Format::R32G32_SFLOAT | vk::Format::R32G32_UINT => 8,
+        vk::Format::R32G32B32A32_SFLOAT | vk::Format::R32G32B32A32_UINT => 16,
+        other => panic!("off-screen images are not of {other:?}"),
     }
 }
 

@@ -18,6 +18,8 @@ pub struct AshOptions {
     pub validation: bool,
     /// Whether barriers are those of Vulkan 1.0 although the device knows better ones.
     pub old_barriers: bool,
+    /// Whether resources share memory. Snapshots hold only what the caller reads then.
+    pub shared_memory: bool,
     /// What kernels are compiled by in the place of limpid.
     pub spirv: Option<SpirvSource>,
 }
@@ -49,7 +51,7 @@ impl Ash {
         let context = Context::open(&ContextOptions { device, validation, ..ContextOptions::default() })?;
         let synchronization = if options.old_barriers { Synchronization::Core1_0 } else { context.synchronization() };
         let denoiser_options = Options {
-            readable_intermediates: true,
+            readable_intermediates: !options.shared_memory,
             timestamps: options.validation && context.has_timestamps(),
             synchronization,
             spirv: options.spirv.clone(),
@@ -124,6 +126,7 @@ impl Executor for Ash {
         let words = |bytes: Vec<u8>| bytemuck::pod_collect_to_vec::<u8, u32>(&bytes);
         Snapshot::take(
             denoiser.plan(),
+            |resource| resource.exported || self.options.readable_intermediates,
             |name, copy| words(context.read_image(&denoiser.intermediate_image(name, copy).unwrap()).unwrap()),
             |name| {
                 let (buffer, size) = denoiser.intermediate_buffer(name).unwrap();

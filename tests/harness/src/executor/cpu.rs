@@ -91,6 +91,7 @@ impl Executor for Cpu {
         denoiser.denoise(&inputs, frame).unwrap();
         Snapshot::take(
             denoiser.plan(),
+            |_| true,
             |name, copy| denoiser.intermediate_texture(name, copy).unwrap().read(),
             |name| denoiser.intermediate_buffer(name).unwrap().read(),
         )
