@@ -30,7 +30,6 @@ impl Preset {
             Preset::Fast => {
                 let mut settings = Settings::default();
                 settings.features.near_taps = 4;
-                settings.features.history_clip = false;
                 settings
             }
             Preset::Reference => {

@@ -27,9 +27,9 @@ const MAX_DECISIONS: usize = 8;
 const DECISION_FOOTPRINT: usize = 24 * 24 * 4;
 /// Share of random cases in which they may not agree: where everything is constant, all pixels can be at the same
 /// threshold at once.
-const MAX_DISAGREEING_CASES: f64 = 0.05;
+const MAX_DISAGREEING_CASES: f64 = 0.01;
 /// Largest share of values that are far apart in all other cases together.
-const MAX_FAR_SHARE_OVERALL: f64 = 0.001;
+const MAX_FAR_SHARE_OVERALL: f64 = 0.0003;
 
 /// What was compared of a pair of executors.
 #[derive(Default)]

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use glam::UVec2;
+use glam::{Mat4, UVec2, Vec3};
 use limpid::Preset;
 use limpid::settings::{DepthEncoding, Fallback};
 use limpid_harness::executor::Cpu;
@@ -81,6 +81,29 @@ fn brightness_and_exposure_cancel() {
             let expected = [plain[0] * factor, plain[1] * factor, plain[2] * factor, plain[3]];
             prop_assert_eq!(&expected, scaled);
         }
+        Ok(())
+    });
+}
+
+#[test]
+fn world_units_do_not_matter() {
+    for_all(16, (any_still(), -12i32..=12, -0.2f32..0.2), |executor, ((size, roughness, seed), exponent, step)| {
+        let unit = 2.0f32.powi(exponent);
+        let case = |unit: f32| {
+            let mut case = Case::still(size, 4, |frame, p| Pixel {
+                radiance: [noise(seed + frame, p), 0.5, 1.0, unit * (1.0 + noise(seed, p))],
+                roughness,
+                depth: unit * (4.0 + 0.1 * noise(7, p)),
+                ..Pixel::WALL
+            });
+            for (frame, frame_step) in case.steps.iter_mut().enumerate() {
+                let moved = Vec3::new(step * frame as f32, 0.0, -0.5 * step) * unit;
+                frame_step.frame.camera.world_to_view = Mat4::from_translation(moved);
+            }
+            case
+        };
+        // A power of two changes no digit.
+        prop_assert_eq!(last_output(&case(1.0).run(executor)), last_output(&case(unit).run(executor)));
         Ok(())
     });
 }
