@@ -38,16 +38,9 @@ struct Choice {
     peaks: vec2<f32>,
 }
 
-fn block_pixel(corner: vec2<u32>, index: u32) -> vec2<u32> {
-    return corner + vec2<u32>(index & 3u, index >> 2u);
-}
-
-// Off screen nothing is denoised.
-fn guide_at(pixel: vec2<u32>) -> Guide {
-    let inside = min(pixel, frame.size - 1u);
-    var guide = unpack_guide(textureLoad(in_guide, inside, 0).xy);
-    guide.denoised = guide.denoised && all(pixel == inside);
-    return guide;
+// Pixels of a block on screen.
+fn pixel_count(corner: vec2<u32>) -> vec2<u32> {
+    return min(frame.size - corner, vec2<u32>(BLOCK_SIZE));
 }
 
 // The denoised pixel nearest to the centre of a block.
@@ -55,9 +48,10 @@ fn choose(corner: vec2<u32>) -> Choice {
     var choice: Choice;
     var nearest = 1e9;
     var count = 0u;
-    for (var i = 0u; i < 16u; i++) {
-        let pixel = block_pixel(corner, i);
-        let guide = guide_at(pixel);
+    let size = pixel_count(corner);
+    for (var i = 0u; i < size.x * size.y; i++) {
+        let pixel = corner + vec2<u32>(i % size.x, i / size.x);
+        let guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
         // A little off the centre, so that no two are as near.
         let offset = vec2<f32>(pixel - corner) - vec2<f32>(1.4, 1.45);
         let distance = dot(offset, offset);
@@ -68,7 +62,7 @@ fn choose(corner: vec2<u32>) -> Choice {
         }
         count += select(0u, 1u, guide.denoised);
         if !ACCUMULATED {
-            let l = select(0.0, luminance(load_radiance(min(pixel, frame.size - 1u))), guide.denoised);
+            let l = select(0.0, luminance(load_radiance(pixel)), guide.denoised);
             choice.peaks = vec2<f32>(max(choice.peaks.x, l), max(choice.peaks.y, min(choice.peaks.x, l)));
         }
     }
@@ -98,9 +92,10 @@ fn block_average(@builtin(global_invocation_id) id: vec3<u32>) {
     var share = vec2<f32>(0.0);
     var noise = vec2<f32>(0.0);
     var moments = vec2<f32>(0.0);
-    for (var i = 0u; i < 16u; i++) {
-        let guide = guide_at(block_pixel(corner, i));
-        let pixel = min(block_pixel(corner, i), frame.size - 1u);
+    let size = pixel_count(corner);
+    for (var i = 0u; i < size.x * size.y; i++) {
+        let pixel = corner + vec2<u32>(i % size.x, i / size.x);
+        let guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
         let w = select(0.0, exp(-plane_penalty(plane, guide, vec2<f32>(pixel) + 0.5)), guide.denoised);
         var c = vec3<f32>(0.0);
         if ACCUMULATED {

@@ -561,7 +561,7 @@ impl fmt::Display for Plan {
                 Kind::Buffer { stride, count, .. } => format!("{} x {stride} bytes", count.of(self.size)),
             };
             let pair = if resource.ping_pong { " pair" } else { "" };
-            writeln!(f, "  {:<12}{:?} {kind}{pair}", resource.name, resource.lifetime)?;
+            writeln!(f, "  {:<14}{:?} {kind}{pair}", resource.name, resource.lifetime)?;
         }
         for pass in &self.passes {
             let grid = match &pass.grid {
