@@ -175,9 +175,9 @@ fn each_pass_is_timed_in_order() {
             continue;
         }
         let times = times(&gpu, &timed).unwrap();
-        let kernels: Vec<&str> = times.iter().map(|time| time.kernel.as_str()).collect();
-        let passes: Vec<&str> = timed.plan().passes.iter().map(|pass| pass.kernel.as_str()).collect();
-        assert_eq!(kernels, passes, "frame {index}");
+        let timed_passes: Vec<&str> = times.iter().map(|time| time.pass.as_str()).collect();
+        let passes: Vec<&str> = timed.plan().passes.iter().map(|pass| pass.name.as_str()).collect();
+        assert_eq!(timed_passes, passes, "frame {index}");
         assert!(times.iter().any(|time| !time.duration.is_zero()), "frame {index}");
     }
 }
