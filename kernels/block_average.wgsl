@@ -80,6 +80,10 @@ fn block_average(@builtin(global_invocation_id) id: vec3<u32>) {
     let choice = choose(corner);
     if !choice.guide.denoised {
         textureStore(out_blocks, id.xy, vec4<u32>(0u));
+        // Neighbours give them no weight, but what is not a number would reach them even so.
+        if SAMPLES_ARE_USED {
+            textureStore(out_samples, id.xy, vec4<u32>(0u));
+        }
         return;
     }
     let position = world_position(choice.pixel, choice.guide.depth);

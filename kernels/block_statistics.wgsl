@@ -49,7 +49,14 @@ fn known_brightness(block: vec2<i32>, position: vec3<f32>) -> f32 {
     // Not a number fails the comparison.
     let on_screen = all(place >= vec2<f32>(0.0)) && all(place < vec2<f32>(frame.prev_size));
     let prev_block = vec2<i32>(select(vec2<f32>(0.0), place, on_screen)) / i32(BLOCK_SIZE);
-    return select(0.0, unpack2x16float(textureLoad(in_prev_light, prev_block, 0).x).x, on_screen);
+    let kept = unpack2x16float(textureLoad(in_prev_light, prev_block, 0).x).x;
+    let l = min(kept * frame.exposure, HALF_MAX);
+    return select(0.0, l / (1.0 + l), on_screen);
+}
+
+// Brightness as it is kept: as luminance that is not exposed, since exposure may change.
+fn luminance_to_keep(brightness: f32) -> f32 {
+    return min(brightness / max(1.0 - brightness, 1e-5) * frame.inverse_exposure, HALF_MAX);
 }
 
 @compute @workgroup_size(8, 8)
@@ -111,6 +118,6 @@ fn block_statistics(@builtin(global_invocation_id) id: vec3<u32>) {
         let tolerance = frame.light_change_sigma * sqrt(variance) + frame.light_change_share * known + LIGHT_FLOOR;
         let changed = select(0.0, smoothstep(1.0, 2.0, abs(typical - known) / tolerance), known > 0.0);
         let kept = select(typical, mix(known, typical, max(LIGHT_RATE, changed)), known > 0.0);
-        textureStore(out_light, center, vec4<u32>(pack2x16float(vec2<f32>(kept, changed)), 0u, 0u, 0u));
+        textureStore(out_light, center, vec4<u32>(pack2x16float(vec2<f32>(luminance_to_keep(kept), changed)), 0u, 0u, 0u));
     }
 }

@@ -179,8 +179,10 @@ impl BindingKind {
 /// and bindings.
 #[derive(Debug, Clone)]
 pub struct Kernel {
-    /// Name of kernel, file and entry point.
+    /// Name of the entry point; in a plan, that of the pass.
     pub name: &'static str,
+    /// Name of its file, without the ending.
+    pub file: &'static str,
     /// The program.
     pub module: naga::Module,
     /// What validation found out about `module`.
@@ -259,7 +261,15 @@ impl Kernel {
         let entry_point =
             module.entry_points.first().ok_or_else(|| fail("reflect", format!("there is no entry point `{name}`")))?;
         let workgroup_size = entry_point.workgroup_size;
-        Ok(Self { name, module, info, bindings, all_bindings, workgroup_size, linked: linked.clone() })
+        let (file, linked) = (name, linked.clone());
+        Ok(Self { name, file, module, info, bindings, all_bindings, workgroup_size, linked })
+    }
+
+    /// The kernel with another name of its entry point.
+    pub(crate) fn renamed(mut self, name: &'static str) -> Self {
+        self.name = name;
+        self.module.entry_points.iter_mut().for_each(|entry_point| name.clone_into(&mut entry_point.name));
+        self
     }
 }
 

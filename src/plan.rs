@@ -61,9 +61,9 @@ pub struct Bound {
 /// One dispatch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pass {
-    /// Name, unique in the plan.
+    /// Name, unique in the plan; also that of the entry point.
     pub name: String,
-    /// Name of the kernel.
+    /// Name of the kernel's file, `kernels/KERNEL.wgsl`. A plan can use one more than once.
     pub kernel: String,
     /// When it runs.
     pub stage: Stage,
@@ -98,6 +98,7 @@ const EXPORTED: &[&str] = &[OUTPUT, "rays", "args"];
 
 /// A pass before it is known which of its bindings the specialised kernel keeps.
 struct PassTemplate {
+    name: &'static str,
     kernel: &'static str,
     is_needed: fn(&Settings) -> bool,
     stage: Stage,
@@ -121,6 +122,7 @@ use Copy::{Current, Previous};
 /// written.
 const PASSES: &[PassTemplate] = &[
     PassTemplate {
+        name: "classify",
         kernel: "classify",
         is_needed: always,
         stage: Stage::Classify,
@@ -147,6 +149,7 @@ const PASSES: &[PassTemplate] = &[
         ],
     },
     PassTemplate {
+        name: "indirect_args",
         kernel: "indirect_args",
         is_needed: always,
         stage: Stage::Classify,
@@ -155,6 +158,7 @@ const PASSES: &[PassTemplate] = &[
         bindings: &[("inout_counters", "counters", Current), ("out_args", "args", Current)],
     },
     PassTemplate {
+        name: "reproject",
         kernel: "reproject",
         is_needed: always,
         stage: Stage::Denoise,
@@ -174,6 +178,7 @@ const PASSES: &[PassTemplate] = &[
         ],
     },
     PassTemplate {
+        name: "prefilter",
         kernel: "prefilter",
         is_needed: |settings| settings.features.spatial_filter,
         stage: Stage::Denoise,
@@ -190,6 +195,7 @@ const PASSES: &[PassTemplate] = &[
         ],
     },
     PassTemplate {
+        name: "fill",
         kernel: "fill",
         is_needed: always,
         stage: Stage::Denoise,
@@ -205,6 +211,7 @@ const PASSES: &[PassTemplate] = &[
         ],
     },
     PassTemplate {
+        name: "resolve_temporal",
         kernel: "resolve_temporal",
         is_needed: always,
         stage: Stage::Denoise,
@@ -228,6 +235,7 @@ const PASSES: &[PassTemplate] = &[
 /// read the `blocks` that the last such pass wrote and write the other ones.
 const FOOTPRINT_PASSES: &[PassTemplate] = &[
     PassTemplate {
+        name: "block_average",
         kernel: "block_average",
         is_needed: always,
         stage: Stage::Denoise,
@@ -241,6 +249,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         ],
     },
     PassTemplate {
+        name: "block_statistics",
         kernel: "block_statistics",
         is_needed: always,
         stage: Stage::Denoise,
@@ -256,6 +265,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         ],
     },
     PassTemplate {
+        name: "block_spread",
         kernel: "block_spread",
         is_needed: |settings| settings.features.outlier_spread,
         stage: Stage::Denoise,
@@ -264,6 +274,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         bindings: &[("in_blocks", BLOCKS, Current), ("out_blocks", BLOCKS, Current)],
     },
     PassTemplate {
+        name: "accumulate",
         kernel: "accumulate",
         is_needed: always,
         stage: Stage::Denoise,
@@ -284,6 +295,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         ],
     },
     PassTemplate {
+        name: "block_average_accumulated",
         kernel: "block_average",
         is_needed: has_wide_filter,
         stage: Stage::Denoise,
@@ -296,6 +308,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         ],
     },
     PassTemplate {
+        name: "block_spread_accumulated",
         kernel: "block_spread",
         is_needed: has_wide_filter,
         stage: Stage::Denoise,
@@ -304,6 +317,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         bindings: &[("in_blocks", BLOCKS, Current), ("out_blocks", BLOCKS, Current)],
     },
     PassTemplate {
+        name: "fill",
         kernel: "fill",
         is_needed: always,
         stage: Stage::Denoise,
@@ -319,6 +333,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         ],
     },
     PassTemplate {
+        name: "lobe_filter",
         kernel: "lobe_filter",
         is_needed: always,
         stage: Stage::Denoise,
@@ -458,7 +473,7 @@ impl Turns {
 fn plan_pass(template: &PassTemplate, settings: &Settings, sources: &Sources) -> Result<(Pass, Kernel), Error> {
     let overrides: Overrides =
         template.overrides.iter().map(|&name| (name.to_owned(), override_value(settings, name))).collect();
-    let kernel = Kernel::from_sources(template.kernel, &overrides, sources)?;
+    let kernel = Kernel::from_sources(template.kernel, &overrides, sources)?.renamed(template.name);
     let mut bindings = Vec::new();
     for binding in &kernel.bindings {
         let (resource, copy) = template
@@ -487,12 +502,8 @@ fn plan_pass(template: &PassTemplate, settings: &Settings, sources: &Sources) ->
         GridTemplate::BlockTiles => Grid::BlockTiles,
         GridTemplate::List(index) => Grid::Indirect { resource: "args".to_owned(), offset: index * ARGS_STRIDE },
     };
-    let name = if template.overrides.contains(&"ACCUMULATED") {
-        format!("{}_accumulated", template.kernel)
-    } else {
-        template.kernel.to_owned()
-    };
-    let pass = Pass { name, kernel: template.kernel.to_owned(), stage: template.stage, overrides, grid, bindings };
+    let (name, kernel_name) = (template.name.to_owned(), template.kernel.to_owned());
+    let pass = Pass { name, kernel: kernel_name, stage: template.stage, overrides, grid, bindings };
     Ok((pass, kernel))
 }
 

@@ -78,7 +78,8 @@ fn record(case: &Case) -> Vec<u32> {
     let mut words = Vec::new();
     push_camera(&mut words, &case.inputs.camera);
     words.extend(case.inputs.size.to_array());
-    words.extend([case.inputs.exposure.to_bits(), u32::from(case.inputs.reset)]);
+    let index = u32::from(case.previous.is_some());
+    words.extend([case.inputs.exposure.to_bits(), index, u32::from(case.inputs.reset)]);
     let (camera, size) = case.previous.unwrap_or((case.inputs.camera, UVec2::ONE));
     push_camera(&mut words, &camera);
     words.extend(size.to_array());
@@ -112,7 +113,7 @@ fn assert_close(rust: &FrameConstants, c: &FrameConstants, what: &str) {
         (bytemuck::cast_slice(bytemuck::bytes_of(rust)), bytemuck::cast_slice(bytemuck::bytes_of(c)));
     for &(name, offset, size) in FrameConstants::FIELDS {
         let range = offset / 4..(offset + size) / 4;
-        if name == "size" || name == "prev_size" {
+        if ["size", "prev_size", "frame_index"].contains(&name) {
             assert_eq!(rust[range.clone()], c[range], "{what}: {name}");
             continue;
         }
@@ -148,6 +149,7 @@ fn c_and_rust_fill_the_same_constants() {
         settings.coverage.environment_from_world = glam::Mat3::from_rotation_y(0.7);
         settings.reproject.max_history = 21.0;
         settings.resolve.stability = 0.3;
+        settings.footprint.filter_scale = 0.7;
         let files = bundle(&settings, &Options { targets: Vec::new(), ..Options::default() }).unwrap();
         let header = files.iter().find(|file| file.path == "limpid.h").unwrap();
         std::fs::write(folder.join("limpid.h"), &header.bytes).unwrap();

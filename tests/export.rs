@@ -98,7 +98,7 @@ proptest! {
         prop_assert_eq!(total("persistent"), plan.memory().persistent);
         prop_assert_eq!(total("transient"), plan.memory().transient);
         for (entry, pass) in manifest["passes"].as_array().unwrap().iter().zip(&plan.passes) {
-            prop_assert_eq!(entry["name"].as_str().unwrap(), &pass.kernel);
+            prop_assert_eq!(entry["name"].as_str().unwrap(), &pass.name);
             for (entry, bound) in entry["bindings"].as_array().unwrap().iter().zip(&pass.bindings) {
                 prop_assert_eq!(entry["variable"].as_str().unwrap(), &bound.variable);
                 prop_assert!(copies.contains_key(entry["resource"].as_str().unwrap()));

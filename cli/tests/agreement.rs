@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::UVec2;
-use limpid::Settings;
+use limpid::Preset;
 use limpid_cli::scene;
 use limpid_cli::sequence::{ChannelNames, Sequence};
 use limpid_harness::{Case, Executor, Table, executors};
@@ -13,6 +13,9 @@ use limpid_harness::{Case, Executor, Table, executors};
 mod frames;
 
 use frames::case;
+
+/// One of each pipeline.
+const PRESETS: [(&str, Preset); 2] = [("default", Preset::Default), ("reference", Preset::Reference)];
 
 fn is_first_on_device(all: &[Box<dyn Executor>], index: usize) -> bool {
     all[..index].iter().all(|other| other.device() != all[index].device())
@@ -53,13 +56,16 @@ fn check(cases: &[(String, Case)]) {
 #[test]
 fn the_built_in_scenes_are_the_same_everywhere() {
     let size = UVec2::new(120, 68);
-    let cases: Vec<_> = ["gallery", "courtyard", "mirrors", "dolly"]
-        .map(|name| {
-            let scene = scene::by_name(name).unwrap();
-            (name.to_owned(), case(&Settings::default(), (0..6).map(|number| scene.render(number, size, 0))))
-        })
-        .into();
-    check(&cases);
+    for (preset, settings) in PRESETS.map(|(name, preset)| (name, preset.settings())) {
+        let cases: Vec<_> = ["gallery", "courtyard", "mirrors", "dolly"]
+            .map(|name| {
+                let scene = scene::by_name(name).unwrap();
+                let frames = (0..6).map(|number| scene.render(number, size, 0));
+                (format!("{name}, {preset}"), case(&settings, frames))
+            })
+            .into();
+        check(&cases);
+    }
 }
 
 #[test]
@@ -70,13 +76,15 @@ fn the_public_sequences_are_the_same_everywhere() {
         let _ = writeln!(std::io::stderr(), "SKIPPED: LIMPID_PEER_DATA names no folder with the public sequences");
         return;
     };
-    let cases: Vec<_> = ["glossy-room", "orbit"]
-        .map(|name| {
-            let folder = Path::new(&data).join("public").join(name);
-            let sequence = Sequence::open(&folder, &ChannelNames::default()).unwrap();
-            let frames = (0..sequence.len().min(6)).map(|index| sequence.load(index).unwrap());
-            (name.to_owned(), case(&Settings::default(), frames))
-        })
-        .into();
-    check(&cases);
+    for (preset, settings) in PRESETS.map(|(name, preset)| (name, preset.settings())) {
+        let cases: Vec<_> = ["glossy-room", "orbit"]
+            .map(|name| {
+                let folder = Path::new(&data).join("public").join(name);
+                let sequence = Sequence::open(&folder, &ChannelNames::default()).unwrap();
+                let frames = (0..sequence.len().min(6)).map(|index| sequence.load(index).unwrap());
+                (format!("{name}, {preset}"), case(&settings, frames))
+            })
+            .into();
+        check(&cases);
+    }
 }

@@ -54,7 +54,8 @@ fn errors_and_counts_are_no_worse_than_approved() {
 #[test]
 fn what_was_interrupted_goes_on() {
     let (whole, parts) = (folder("whole"), folder("parts"));
-    let scenes = ["--scene", "still", "--scene", "mirrors", "--no-ablations", "--set", "resolve.stability=0.2,0.9"];
+    let scenes =
+        ["--scene", "still", "--scene", "mirrors", "--no-ablations", "--set", "footprint.filter_scale=0.2,0.9"];
     succeeds(&bench(&whole, &scenes));
     succeeds(&bench(&parts, &["--scene", "still", "--no-ablations"]));
     let again = bench(&parts, &scenes);
@@ -65,8 +66,8 @@ fn what_was_interrupted_goes_on() {
         |report: &mut Report| report.runs.sort_by(|a, b| (&a.sequence, &a.variant).cmp(&(&b.sequence, &b.variant)));
     order(&mut whole_report);
     order(&mut parts_report);
-    // Two sequences; noisy, accumulation, two presets and two values.
-    assert_eq!(whole_report.runs.len(), 12);
+    // Two sequences; noisy, accumulation, three presets and two values.
+    assert_eq!(whole_report.runs.len(), 14);
     assert_eq!(whole_report, parts_report);
     for file in ["report.html", "bench.csv", "figures/convergence-still.svg", "pictures/mirrors--default.png"] {
         assert!(parts.join(file).is_file(), "{file}");

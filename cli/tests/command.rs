@@ -67,6 +67,8 @@ fn demo<'a>(out: &'a str, more: &[&'a str]) -> serde_json::Value {
 fn usage_is_explained_and_mistakes_have_code_two() {
     let help = limpid(&["--help"]);
     assert!(help.status.success());
+    let plan_help = text(&limpid(&["plan", "--help"]).stdout);
+    assert!(plan_help.contains("default, fast, reference"), "{plan_help}");
     for command in ["demo", "denoise", "analyze", "bench", "export", "stability", "plan"] {
         assert!(text(&help.stdout).contains(command));
         assert!(limpid(&[command, "--help"]).status.success());
@@ -83,8 +85,10 @@ fn usage_is_explained_and_mistakes_have_code_two() {
 fn plans_are_printed() {
     let plan = succeeds(&["plan", "--preset", "reference", "--size", "640x360"]);
     assert!(plan.contains("reproject") && plan.contains("6 dispatches"), "{plan}");
+    let plan = succeeds(&["plan", "--size", "640x360"]);
+    assert!(plan.contains("block_spread_accumulated") && plan.contains("10 dispatches"), "{plan}");
     let fewer = succeeds(&["plan", "--features", "-spatial_filter,constant_roughness=0.3"]);
-    assert!(!fewer.contains("prefilter") && !fewer.contains("roughness "), "{fewer}");
+    assert!(!fewer.contains("_accumulated") && !fewer.contains("roughness "), "{fewer}");
     let json = succeeds(&["plan", "--json", "--set", "coverage.fallback=environment"]);
     let plan: limpid::Plan = serde_json::from_str(&json).unwrap();
     assert!(plan.inputs().any(|input| input == "environment"));
@@ -221,15 +225,15 @@ fn stability_is_judged_case_by_case() {
     let json = succeeds(&["stability", "--backend", "cpu", "--case", "NaN at one pixel", "--json"]);
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();
     let verdicts = report["verdicts"].as_array().unwrap();
-    // Two cases with two presets: finite, bounded, footprint and lifetime.
-    assert_eq!(verdicts.len(), 16);
+    // Two cases with three presets: finite, bounded, footprint and lifetime.
+    assert_eq!(verdicts.len(), 24);
     assert!(verdicts.iter().all(|verdict| verdict["passed"] == true), "{json}");
     let json = succeeds(&["stability", "--probe", "--case", "infinity at one pixel, soon", "--json"]);
     let probe: serde_json::Value = serde_json::from_str(&json).unwrap();
     // Each kernel with its operations, and outputs that are right but for rounding.
-    let worst = probe["resolve_temporal"]["outputs"][0]["relative"].as_f64().unwrap();
+    let worst = probe["lobe_filter"]["outputs"][0]["relative"].as_f64().unwrap();
     assert!(worst > 0.0 && worst < 1e-2, "{json}");
-    assert!(probe["reproject"]["operations"].as_u64().unwrap() > 100_000);
+    assert!(probe["accumulate"]["operations"].as_u64().unwrap() > 100_000);
     fails(&["stability", "--case", "no such case"], 1, &["no such case"]);
     fails(&["stability", "--long", "3"], 2, &["160 to 1000000"]);
 }

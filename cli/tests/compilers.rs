@@ -3,10 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
-use limpid::Settings;
 use limpid::emit::{Checks, GlslDialect, ShaderModel, SpirvVersion};
 use limpid::export::{File, MANIFEST, Options, Target, bundle};
 use limpid::settings::{Fallback, NormalEncoding, RayList, RaysPerQuad};
+use limpid::{Preset, Settings};
 use proptest::prelude::*;
 use serde_json::Value;
 
@@ -25,9 +25,11 @@ fn settings() -> Vec<Settings> {
     let mut list = RayList::default();
     (list.rays_per_quad, list.variance_threshold) = (RaysPerQuad::One, Some(0.1));
     all.coverage.ray_list = Some(list);
-    let mut few = Settings::default();
+    // Samples are used or not, and so are blocks of what was accumulated.
+    let mut few = Preset::Fast.settings();
     few.coverage.fallback = Fallback::Black;
-    vec![Settings::default(), all, few]
+    (few.features.outlier_spread, few.features.wide_filter) = (false, false);
+    vec![Settings::default(), Preset::Reference.settings(), all, few]
 }
 
 struct Exported {

@@ -53,7 +53,7 @@ fn runs() -> Vec<Run> {
     moved.steps[3].frame.reset = true;
 
     let mut few = Settings::default();
-    (few.features.spatial_filter, few.features.history_search) = (false, false);
+    (few.features.spatial_filter, few.features.light_change) = (false, false);
     few.features.constant_roughness = Some(0.25);
     let few = case(&few, "mirrors", &[SIZE; 3]);
     vec![

@@ -2,10 +2,11 @@
 
 use glam::{Mat4, UVec2, Vec2, camera::rh};
 
+use super::describe::is_unsigned;
 use super::{Export, formats};
 use crate::frame::{self, FrameConstants};
 use crate::plan::{Grid, Stage};
-use crate::resource::{Access, Copy, Count, Extent, Kind, Lifetime};
+use crate::resource::{Access, BLOCK_SIZE, Copy, Count, Extent, Kind, Lifetime, TILE_SIZE};
 use crate::settings::{DepthEncoding, NdcY};
 use crate::{Camera, Error, FrameInputs};
 
@@ -25,7 +26,7 @@ fn floats(values: &[f32]) -> String {
 }
 
 fn c_field(name: &str, size: usize) -> String {
-    let ty = if name == "size" || name == "prev_size" { "uint32_t" } else { "float" };
+    let ty = if is_unsigned(name) { "uint32_t" } else { "float" };
     match size / 4 {
         1 => format!("    {ty} {name};\n"),
         count => format!("    {ty} {name}[{count}];\n"),
@@ -46,7 +47,8 @@ impl Export<'_> {
              \x20* SPDX-License-Identifier: MIT OR Apache-2.0\n */\n#ifndef {guard}\n#define {guard}\n\n\
              #include <float.h>\n#include <math.h>\n#include <stddef.h>\n#include <stdint.h>\n#include <string.h>\n\n\
              #ifdef __cplusplus\n#define LIMPID_STATIC_ASSERT static_assert\n#else\n\
-             #define LIMPID_STATIC_ASSERT _Static_assert\n#endif\n\n#define LIMPID_TILE_SIZE 8u\n\
+             #define LIMPID_STATIC_ASSERT _Static_assert\n#endif\n\n#define LIMPID_TILE_SIZE {TILE_SIZE}u\n\
+             #define LIMPID_BLOCK_SIZE {BLOCK_SIZE}u\n\
              #define LIMPID_VERSION \"{0}\"\n#define LIMPID_SETTINGS_HASH \"{}\"\n\n",
             env!("CARGO_PKG_VERSION"),
             self.settings_hash,

@@ -12,6 +12,7 @@ typedef struct LimpidInputs {
     LimpidCamera camera;
     uint32_t size[2]; /* pixels of this frame, at most those allocated */
     float exposure;   /* factor that brings radiance near 1, above 0 */
+    uint32_t index;   /* of this frame: counts from 0 */
     int reset;        /* not 0: history is of no use (camera cut) */
 } LimpidInputs;
 
@@ -114,29 +115,42 @@ static inline void limpid_store(const double *matrix, float *out) {
     }
 }
 
+/*
+ * (x w, y w, depth, 1), x and y in pixels, to view space, with w = clip_w[0] + clip_w[1] * depth. Returns the sign of
+ * view-space z in front of the camera.
+ */
+static inline double limpid_pixel_to_view(const LimpidSettings *settings, const LimpidCamera *camera,
+                                          const uint32_t *size, double *view_from_pixel, float *clip_w) {
+    const float *p = camera->view_to_clip;
+    const double ndc_y = settings->ndc_y == LIMPID_NDC_Y_UP ? 1.0 : -1.0;
+    const double w_per_z = limpid_at(p, 3, 2), z_per_z = limpid_at(p, 2, 2);
+    const double reversed = settings->depth == LIMPID_DEPTH_REVERSED_DEVICE ? -1.0 : 1.0;
+    const double sign =
+        w_per_z != 0.0 ? (w_per_z < 0.0 ? -1.0 : 1.0) : (signbit(z_per_z) ? -1.0 : 1.0) * reversed;
+    const double w[2] = {limpid_at(p, 3, 3), w_per_z * sign};
+    const double scale[2] = {2.0 / (double)size[0], -2.0 * ndc_y / (double)size[1]};
+    const double start[2] = {-1.0, ndc_y};
+    memset(view_from_pixel, 0, 16 * sizeof *view_from_pixel);
+    for (int i = 0; i < 2; i++) {
+        const double offset = scale[i] * (double)camera->jitter[i] + start[i];
+        const double diagonal = limpid_at(p, i, i);
+        view_from_pixel[5 * i] = scale[i] / diagonal;
+        view_from_pixel[8 + i] = (offset * w[1] - limpid_at(p, i, 2) * sign) / diagonal;
+        view_from_pixel[12 + i] = (offset * w[0] - limpid_at(p, i, 3)) / diagonal;
+        clip_w[i] = (float)w[i];
+    }
+    view_from_pixel[10] = sign;
+    view_from_pixel[15] = 1.0;
+    return sign;
+}
+
 /* Pixels and depth of this frame to positions relative to the camera. */
 static inline void limpid_fill_position(
     const LimpidSettings *settings, const LimpidInputs *inputs, const double *view_to_world, LimpidFrame *frame) {
     const float *p = inputs->camera.view_to_clip;
-    const double ndc_y = settings->ndc_y == LIMPID_NDC_Y_UP ? 1.0 : -1.0;
-    const double w_per_z = limpid_at(p, 3, 2), z_per_z = limpid_at(p, 2, 2);
-    const double reversed = settings->depth == LIMPID_DEPTH_REVERSED_DEVICE ? -1.0 : 1.0;
-    /* Sign of view-space z in front of the camera. */
+    double view_from_pixel[16], rotation[16], world_from_pixel[16];
     const double sign =
-        w_per_z != 0.0 ? (w_per_z < 0.0 ? -1.0 : 1.0) : (signbit(z_per_z) ? -1.0 : 1.0) * reversed;
-    const double clip_w[2] = {limpid_at(p, 3, 3), w_per_z * sign};
-    const double scale[2] = {2.0 / (double)inputs->size[0], -2.0 * ndc_y / (double)inputs->size[1]};
-    const double start[2] = {-1.0, ndc_y};
-    double view_from_pixel[16] = {0}, rotation[16], world_from_pixel[16];
-    for (int i = 0; i < 2; i++) {
-        const double offset = scale[i] * (double)inputs->camera.jitter[i] + start[i];
-        const double diagonal = limpid_at(p, i, i);
-        view_from_pixel[5 * i] = scale[i] / diagonal;
-        view_from_pixel[8 + i] = (offset * clip_w[1] - limpid_at(p, i, 2) * sign) / diagonal;
-        view_from_pixel[12 + i] = (offset * clip_w[0] - limpid_at(p, i, 3)) / diagonal;
-    }
-    view_from_pixel[10] = sign;
-    view_from_pixel[15] = 1.0;
+        limpid_pixel_to_view(settings, &inputs->camera, inputs->size, view_from_pixel, frame->clip_w);
     for (int i = 0; i < 16; i++) {
         rotation[i] = i < 12 ? view_to_world[i] : (i == 15 ? 1.0 : 0.0);
     }
@@ -149,8 +163,7 @@ static inline void limpid_fill_position(
         frame->forward[i] = (float)(sign * z[i] / length);
     }
     frame->forward[3] = 0.0f;
-    frame->clip_w[0] = (float)clip_w[0];
-    frame->clip_w[1] = (float)clip_w[1];
+    frame->pixels_per_unit = (float)((double)inputs->size[1] * fabs(limpid_at(p, 1, 1)) / 2.0);
 
     if (settings->depth == LIMPID_DEPTH_LINEAR) {
         const float linear[4] = {0.0f, 1.0f, 1.0f, 0.0f};
@@ -168,9 +181,10 @@ static inline void limpid_fill_position(
     }
 }
 
-/* Positions to last frame's uv. */
-static inline void limpid_fill_reprojection(
-    const LimpidSettings *settings, const LimpidCamera *previous, const double *view_to_world, LimpidFrame *frame) {
+/* Positions to last frame's uv, and last frame's pixels and depth to positions, all relative to this frame's camera. */
+static inline void limpid_fill_reprojection(const LimpidSettings *settings, const LimpidCamera *previous,
+                                            const uint32_t *prev_size, const double *view_to_world,
+                                            LimpidFrame *frame) {
     const double ndc_y = settings->ndc_y == LIMPID_NDC_Y_UP ? 1.0 : -1.0;
     const double uv_from_ndc[16] = {0.5, 0, 0, 0, 0, -0.5 * ndc_y, 0, 0, 0, 0, 1, 0, 0.5, 0.5, 0, 1};
     double clip[16], view[16], product[16], from_world[16], from_relative[16];
@@ -186,6 +200,15 @@ static inline void limpid_fill_reprojection(
     limpid_multiply(product, view, from_world);
     limpid_multiply(from_world, eye, from_relative);
     limpid_store(from_relative, frame->prev_uv_from_world);
+
+    double prev_view_to_world[16], view_from_pixel[16], world_from_pixel[16];
+    limpid_inverse(previous->world_to_view, prev_view_to_world);
+    for (int i = 0; i < 3; i++) {
+        prev_view_to_world[12 + i] -= eye[12 + i];
+    }
+    limpid_pixel_to_view(settings, previous, prev_size, view_from_pixel, frame->prev_clip_w);
+    limpid_multiply(prev_view_to_world, view_from_pixel, world_from_pixel);
+    limpid_store(world_from_pixel, frame->world_from_prev_pixel);
 }
 
 /*
@@ -213,7 +236,7 @@ static inline const char *limpid_fill_constants(
     limpid_inverse(inputs->camera.world_to_view, view_to_world);
     memset(frame, 0, sizeof *frame);
     limpid_fill_position(settings, inputs, view_to_world, frame);
-    limpid_fill_reprojection(settings, prev_camera, view_to_world, frame);
+    limpid_fill_reprojection(settings, prev_camera, prev_size, view_to_world, frame);
     for (int column = 0; column < 3; column++) {
         for (int row = 0; row < 3; row++) {
             frame->environment_from_world[4 * column + row] = settings->environment_from_world[3 * column + row];
@@ -235,6 +258,7 @@ static inline const char *limpid_fill_constants(
     }
     frame->exposure = inputs->exposure;
     frame->inverse_exposure = 1.0f / inputs->exposure;
+    frame->frame_index = inputs->index;
     limpid_copy_settings(settings, frame);
     frame->history_length_steps = floorf(255.0f / settings->max_history);
     return NULL;

@@ -33,9 +33,14 @@ fn bytes(resource: &Resource) -> Option<String> {
     }
 }
 
-/// Type of a field by its size; sizes in pixels are unsigned.
+/// Whether a field of the constants is unsigned; the others are floats.
+pub(super) fn is_unsigned(name: &str) -> bool {
+    matches!(name, "size" | "prev_size" | "frame_index")
+}
+
+/// Type of a field by its size.
 pub(super) fn field_type(name: &str, size: usize) -> String {
-    let scalar = if name == "size" || name == "prev_size" { "uint" } else { "float" };
+    let scalar = if is_unsigned(name) { "uint" } else { "float" };
     match size {
         4 => scalar.to_owned(),
         64 => "float4x4".to_owned(),

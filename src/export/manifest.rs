@@ -119,7 +119,7 @@ pub struct ResourceEntry {
 /// A dispatch.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct PassEntry {
-    /// Name of the kernel.
+    /// Name, also of the entry point except in GLSL.
     pub name: String,
     /// Before or after the renderer traces rays.
     pub stage: Stage,

@@ -18,6 +18,11 @@ int main(void) {
     if (extent[0] != 240 || extent[1] != 135 || grid[0] != 240 || grid[1] != 135 || grid[2] != 1) {
         return 3;
     }
+    limpid_extent(&limpid_resources[LIMPID_RESOURCE_BLOCKS], 1921, 1080, extent);
+    limpid_grid(&limpid_passes[LIMPID_PASS_BLOCK_AVERAGE], 1921, 1080, grid);
+    if (extent[0] != 481 || extent[1] != 270 || grid[0] != 61 || grid[1] != 34 || grid[2] != 1) {
+        return 4;
+    }
     while (fread(&record, sizeof record, 1, stdin) == 1) {
         LimpidFrame frame;
         const LimpidPrevious *previous = record.has_previous ? &record.previous : NULL;

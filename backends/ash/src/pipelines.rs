@@ -57,7 +57,7 @@ impl Drop for SetLayout {
 /// One pass on the device.
 pub(crate) struct Pipeline {
     gpu: Arc<Shared>,
-    pub(crate) kernel: &'static str,
+    pub(crate) pass: &'static str,
     pub(crate) label: String,
     pub(crate) pipeline: vk::Pipeline,
     pub(crate) layout: vk::PipelineLayout,
@@ -86,7 +86,7 @@ impl Pipeline {
         let layout = unsafe { gpu.device.create_pipeline_layout(&info, None) }
             .map_err(Error::vulkan(format!("creating the pipeline layout of {label}")))?;
         let mut pipeline =
-            Self { gpu: Arc::clone(gpu), kernel: kernel.name, label, pipeline: vk::Pipeline::null(), layout, own };
+            Self { gpu: Arc::clone(gpu), pass: kernel.name, label, pipeline: vk::Pipeline::null(), layout, own };
         let words = match &options.spirv {
             Some(source) => source(kernel)?,
             None => {

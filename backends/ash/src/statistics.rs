@@ -6,8 +6,8 @@ use crate::pipelines::Pipeline;
 /// What the driver's compiler says of one pass; see [`Context::statistics`](crate::offscreen::Context::statistics).
 #[derive(Debug, Clone, PartialEq)]
 pub struct PassStatistics {
-    /// Name of the kernel.
-    pub kernel: String,
+    /// Name of the pass.
+    pub pass: String,
     /// Name that the driver gives to what it compiled: some compile a kernel more than once, for several sizes of
     /// subgroups.
     pub executable: String,
@@ -50,7 +50,7 @@ impl Pipeline {
             // SAFETY: as above; the executable exists.
             let statistics = unsafe { extension.get_pipeline_executable_statistics(&info) }.map_err(failed())?;
             Ok(PassStatistics {
-                kernel: self.kernel.to_owned(),
+                pass: self.pass.to_owned(),
                 executable: text(executable.name_as_c_str()),
                 subgroup_size: executable.subgroup_size,
                 values: statistics.iter().map(|s| (text(s.name_as_c_str()), value(s))).collect(),

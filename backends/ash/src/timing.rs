@@ -11,8 +11,8 @@ use crate::gpu::Shared;
 /// How long a pass took on the device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PassTime {
-    /// Name of the kernel.
-    pub kernel: String,
+    /// Name of the pass.
+    pub pass: String,
     /// From its start to its end. Passes may overlap.
     pub duration: Duration,
 }
@@ -75,7 +75,7 @@ impl Timing {
     pub(crate) fn read<'n>(
         &self,
         slot: usize,
-        kernels: impl Iterator<Item = &'n str>,
+        passes: impl Iterator<Item = &'n str>,
     ) -> Result<Option<Vec<PassTime>>, Error> {
         let mut ticks = vec![0u64; 2 * self.passes as usize];
         let flags = vk::QueryResultFlags::TYPE_64;
@@ -87,10 +87,10 @@ impl Timing {
         }
         let period = f64::from(self.gpu.limits.timestamp_period);
         let mask = u64::MAX >> (64 - self.gpu.timestamp_valid_bits.min(64));
-        let time = |(kernel, ticks): (&str, &[u64])| {
+        let time = |(pass, ticks): (&str, &[u64])| {
             let nanoseconds = (ticks[1].wrapping_sub(ticks[0]) & mask) as f64 * period;
-            PassTime { kernel: kernel.to_owned(), duration: Duration::from_nanos(nanoseconds as u64) }
+            PassTime { pass: pass.to_owned(), duration: Duration::from_nanos(nanoseconds as u64) }
         };
-        Ok(Some(kernels.zip(ticks.chunks_exact(2)).map(time).collect()))
+        Ok(Some(passes.zip(ticks.chunks_exact(2)).map(time).collect()))
     }
 }

@@ -70,8 +70,8 @@ fn whatever_allocation_fails_nothing_leaks() {
         assert_eq!(context.allocated_bytes(), 0);
         blocks += 1;
     }
-    // Pairs of guide and signal, output, average, tiles, counters, args, constants.
-    assert_eq!(blocks, 10);
+    // Pairs of guide, history and light, two of blocks, samples, output, tiles, counters, args, constants.
+    assert_eq!(blocks, 14);
     assert_eq!(context.allocated_bytes(), 0);
     assert_eq!(context.messages(), Vec::<String>::new());
 }

@@ -111,7 +111,7 @@ fn compile(kernel: &Kernel) -> Result<Executor, Error> {
     Executor::new(&kernel.module, &kernel.info, kernel.name).map_err(|source| {
         let offset = if let CompileError::Unsupported { offset, .. } = source { offset } else { None };
         let place = offset.and_then(|offset| kernel.linked.place(offset));
-        let place = place.unwrap_or_else(|| format!("kernels/{}.wgsl", kernel.name));
+        let place = place.unwrap_or_else(|| format!("kernels/{}.wgsl", kernel.file));
         Error::Compile { kernel: kernel.name, place, source }
     })
 }

@@ -1,7 +1,7 @@
 //! Checked execution finds what kernels must not do, and limpid's kernels do none of it.
 
 use glam::{Mat4, UVec2, Vec2, camera::rh};
-use limpid::settings::{Fallback, RayList, RaysPerQuad};
+use limpid::settings::{Fallback, Pipeline, RayList, RaysPerQuad};
 use limpid::{Camera, FrameInputs, Settings};
 use limpid_cpu::{Binding, Buffer, Denoiser, Executor, Fault, FaultKind, Inputs, TexelFormat, Texture};
 
@@ -100,13 +100,16 @@ fn kernels_do_nothing_of_the_kind() {
         view_to_clip: rh::proj::directx::perspective(1.0, 1.6, 0.1, 100.0),
         jitter: Vec2::ZERO,
     };
-    for (fallback, rays) in [
-        (Fallback::Input, None),
-        (Fallback::Black, Some(RaysPerQuad::One)),
-        (Fallback::Environment, Some(RaysPerQuad::Two)),
-        (Fallback::Input, Some(RaysPerQuad::Four)),
+    use Pipeline::{Footprint, Published};
+    for (pipeline, fallback, rays) in [
+        (Footprint, Fallback::Input, None),
+        (Published, Fallback::Black, Some(RaysPerQuad::One)),
+        (Footprint, Fallback::Environment, Some(RaysPerQuad::Two)),
+        (Published, Fallback::Environment, None),
+        (Footprint, Fallback::Input, Some(RaysPerQuad::Four)),
     ] {
         let mut settings = Settings::default();
+        settings.pipeline = pipeline;
         settings.conventions.depth = limpid::settings::DepthEncoding::Linear;
         settings.coverage.roughness_threshold = 0.7;
         settings.coverage.fallback = fallback;

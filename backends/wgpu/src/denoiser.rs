@@ -230,8 +230,8 @@ impl Denoiser {
         inputs.check(self.core.plan().inputs(), self.core.settings(), frame.size)?;
         let schedule = self.core.next_frame(frame)?;
         if self.options.timestamps && self.timing.is_none() {
-            let kernels = self.core.plan().passes.iter().map(|pass| pass.name.clone()).collect();
-            self.timing = Some(Timing::new(&self.device, queue, kernels));
+            let passes = self.core.plan().passes.iter().map(|pass| pass.name.clone()).collect();
+            self.timing = Some(Timing::new(&self.device, queue, passes));
         }
         self.constants_slot = (self.constants_slot + 1) % FRAMES_BEFORE_SUBMIT;
         let offset = self.constants_slot * self.constants_stride;

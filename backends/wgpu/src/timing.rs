@@ -7,8 +7,8 @@ use std::time::Duration;
 /// How long a pass took on the device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PassTime {
-    /// Name of the kernel.
-    pub kernel: String,
+    /// Name of the pass.
+    pub pass: String,
     /// From its start to its end.
     pub duration: Duration,
 }
@@ -28,7 +28,7 @@ pub(crate) struct Timing {
     resolved: wgpu::Buffer,
     slots: Vec<Slot>,
     latest: Option<usize>,
-    kernels: Vec<String>,
+    passes: Vec<String>,
     /// Nanoseconds of a tick.
     period: f32,
 }
@@ -37,8 +37,8 @@ pub(crate) struct Timing {
 const SLOT_COUNT: usize = 3;
 
 impl Timing {
-    pub(crate) fn new(device: &wgpu::Device, queue: &wgpu::Queue, kernels: Vec<String>) -> Self {
-        let count = 2 * kernels.len() as u32;
+    pub(crate) fn new(device: &wgpu::Device, queue: &wgpu::Queue, passes: Vec<String>) -> Self {
+        let count = 2 * passes.len() as u32;
         let size = u64::from(count) * u64::from(wgpu::QUERY_SIZE);
         let buffer = |usage| {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -62,7 +62,7 @@ impl Timing {
                 })
                 .collect(),
             latest: None,
-            kernels,
+            passes,
             period: queue.get_timestamp_period(),
         }
     }
@@ -80,7 +80,7 @@ impl Timing {
         let free = self.slots.iter().position(|slot| slot.state.load(Ordering::Acquire) != MAPPED);
         self.latest = free;
         if let Some(slot) = free.map(|index| &self.slots[index]) {
-            let count = 2 * self.kernels.len() as u32;
+            let count = 2 * self.passes.len() as u32;
             encoder.resolve_query_set(&self.queries, 0..count, &self.resolved, 0);
             encoder.copy_buffer_to_buffer(&self.resolved, 0, &slot.readback, 0, slot.readback.size());
             slot.state.store(RECORDED, Ordering::Release);
@@ -94,11 +94,11 @@ impl Timing {
             return;
         }
         let (readback, state) = (slot.readback.clone(), Arc::clone(&slot.state));
-        let (kernels, period) = (self.kernels.clone(), self.period);
+        let (passes, period) = (self.passes.clone(), self.period);
         slot.readback.map_async(wgpu::MapMode::Read, .., move |result| {
             let view = result.ok().and_then(|()| readback.get_mapped_range(..).ok());
             if let Some(view) = view {
-                let times = pass_times(bytemuck::pod_collect_to_vec(&view[..]), kernels, period);
+                let times = pass_times(bytemuck::pod_collect_to_vec(&view[..]), passes, period);
                 drop(view);
                 readback.unmap();
                 state.store(FREE, Ordering::Release);
@@ -108,10 +108,10 @@ impl Timing {
     }
 }
 
-fn pass_times(ticks: Vec<u64>, kernels: Vec<String>, period: f32) -> Vec<PassTime> {
-    let time = |(kernel, ticks): (String, &[u64])| {
+fn pass_times(ticks: Vec<u64>, passes: Vec<String>, period: f32) -> Vec<PassTime> {
+    let time = |(pass, ticks): (String, &[u64])| {
         let nanoseconds = ticks[1].saturating_sub(ticks[0]) as f64 * f64::from(period);
-        PassTime { kernel, duration: Duration::from_nanos(nanoseconds as u64) }
+        PassTime { pass, duration: Duration::from_nanos(nanoseconds as u64) }
     };
-    kernels.into_iter().zip(ticks.chunks_exact(2)).map(time).collect()
+    passes.into_iter().zip(ticks.chunks_exact(2)).map(time).collect()
 }

@@ -5,7 +5,7 @@ mod support;
 use glam::{DMat4, DVec3, Mat4, UVec2, Vec2, Vec3, camera::lh, camera::rh};
 use limpid::settings::{Channel, DepthEncoding, NdcY, NormalEncoding, RoughnessEncoding};
 use limpid::{Camera, FrameInputs, Settings};
-use support::{Denoised, Gpu, HALF_STEP, Pixel, Run, Scene, jitter_of, linear_settings, motion_only_settings, noise};
+use support::{Denoised, Gpu, HALF_STEP, Pixel, Run, Scene, by_motion_only, jitter_of, noise, pipelines};
 
 const SIZE: UVec2 = UVec2::new(72, 56);
 const FRAMES: u32 = 6;
@@ -116,19 +116,23 @@ fn difference(a: &[Denoised], b: &[Denoised]) -> (f32, f32) {
     (differences.iter().copied().fold(0.0, f32::max), differences.iter().sum::<f32>() / differences.len() as f32)
 }
 
-fn assert_all_agree(base: &Settings, plain: &Renderer, others: &[Renderer], wrong: &[Renderer]) {
+fn assert_all_agree(bases: &[Settings], plain: &Renderer, others: &[Renderer], wrong: &[Renderer]) {
     let Some(gpu) = Gpu::open() else { return };
-    let expected = render(&gpu, base, plain);
+    bases.iter().for_each(|base| assert_agree(&gpu, base, plain, others, wrong));
+}
+
+fn assert_agree(gpu: &Gpu, base: &Settings, plain: &Renderer, others: &[Renderer], wrong: &[Renderer]) {
+    let expected = render(gpu, base, plain);
     expected.iter().for_each(|frame| frame.assert_usable(plain.name));
     for renderer in others {
-        let (largest, mean) = difference(&render(&gpu, base, renderer), &expected);
+        let (largest, mean) = difference(&render(gpu, base, renderer), &expected);
         // Decoding rounds, which moves history by less than 1/1000 pixel: now and then a half is stored one
         // step off, and goes into the next frame.
         let agrees = largest < 2.5 * HALF_STEP && mean < 0.05 * HALF_STEP;
         assert!(agrees, "{}: largest {largest}, mean {mean}", renderer.name);
     }
     for renderer in wrong {
-        let (largest, mean) = difference(&render(&gpu, base, renderer), &expected);
+        let (largest, mean) = difference(&render(gpu, base, renderer), &expected);
         // More than 1 % in the mean, where agreement is a hundred times better.
         assert!(mean > 10.0 * HALF_STEP, "{} goes unnoticed: largest {largest}, mean {mean}", renderer.name);
     }
@@ -150,7 +154,7 @@ fn depth_and_clip_space_may_be_encoded_in_any_way() {
         ..device(name, view_to_clip)
     };
     assert_all_agree(
-        &linear_settings(),
+        &pipelines(),
         &plain("plain"),
         &[
             device("standard", rh::proj::directx::perspective(FIELD_OF_VIEW, ASPECT, NEAR, FAR)),
@@ -191,7 +195,7 @@ fn octahedral(n: Vec3) -> Vec3 {
 #[test]
 fn normal_and_roughness_may_be_encoded_in_any_way() {
     assert_all_agree(
-        &linear_settings(),
+        &pipelines(),
         &plain("plain"),
         &[
             Renderer { encode: |p, _| Pixel { normal: 3.0 * p.normal, ..p }, ..plain("normals of length 3") },
@@ -236,7 +240,7 @@ fn normal_and_roughness_may_be_encoded_in_any_way() {
 #[test]
 fn motion_may_have_any_scale_and_a_wrong_one_shows() {
     assert_all_agree(
-        &motion_only_settings(),
+        &pipelines().map(by_motion_only),
         &plain("plain"),
         &[
             Renderer {
@@ -261,7 +265,7 @@ fn motion_may_have_any_scale_and_a_wrong_one_shows() {
 fn motion_may_include_jitter() {
     let jittered = |name| Renderer { jittered: true, ..plain(name) };
     assert_all_agree(
-        &motion_only_settings(),
+        &pipelines().map(by_motion_only),
         &jittered("jittered"),
         &[Renderer {
             tell: |settings| settings.conventions.motion_includes_jitter = true,

@@ -5,8 +5,8 @@ mod support;
 use glam::{IVec2, Mat4, UVec2, Vec2, Vec3};
 use limpid::FrameInputs;
 use support::{
-    Denoised, Gpu, HALF_STEP, Pixel, Run, Scene, WALL, linear_settings, motion_only_settings, noise, positions,
-    still_camera, still_frame,
+    Denoised, Gpu, HALF_STEP, Pixel, Run, Scene, WALL, by_motion_only, linear_settings, noise, pipelines, positions,
+    published_settings, still_camera, still_frame,
 };
 
 fn mean(values: impl Iterator<Item = f32>) -> f32 {
@@ -18,9 +18,17 @@ fn mean(values: impl Iterator<Item = f32>) -> f32 {
 fn history_grows_by_a_frame_up_to_the_cap_of_its_roughness() {
     let Some(gpu) = Gpu::open() else { return };
     let size = UVec2::new(24, 16);
-    let mut run = Run::new(&gpu, &linear_settings(), size);
     // Columns of tiles: GGX alpha 0, 0.01 and 0.64.
-    let caps = [8.0, 32.0 * (1.0 - (-1.0f32).exp()), 32.0];
+    let published = [8.0, 32.0 * (1.0 - (-1.0f32).exp()), 32.0];
+    // History is of so many frames, to which this one is added; of two thirds of the way to the roughness from
+    // which on it may be longest, the smooth step is 20 / 27. No more than 31 are stored.
+    let footprint = [9.0, 9.0 + 23.0 * 20.0 / 27.0, 31.0];
+    for (settings, caps, tolerance) in [(published_settings(), published, 0.2), (linear_settings(), footprint, 0.7)] {
+        assert_grows(Run::new(&gpu, &settings, size), size, caps, tolerance);
+    }
+}
+
+fn assert_grows(mut run: Run<'_>, size: UVec2, caps: [f32; 3], tolerance: f32) {
     for frame in 1..=36 {
         let mut scene = Scene::noisy_wall(size, frame);
         for p in positions(size) {
@@ -29,10 +37,10 @@ fn history_grows_by_a_frame_up_to_the_cap_of_its_roughness() {
         let denoised = run.still(&scene);
         for p in positions(size) {
             let (length, cap) = (denoised.length_at(p), caps[p.x as usize / 8]);
-            // Whole frames are stored exactly, the cap in between to a seventh of a frame. Roughness is stored
-            // in 1/1023, which moves that cap by another 0.1.
+            // Whole frames are stored exactly, the cap in between to a seventh of a frame or to a frame. Roughness
+            // is stored in 1/1023, which moves that cap by another 0.1.
             let expected = (frame as f32).min(cap);
-            let tolerance = if expected.fract() == 0.0 { 0.0 } else { 0.2 };
+            let tolerance = if expected.fract() == 0.0 { 0.0 } else { tolerance };
             assert!((length - expected).abs() <= tolerance, "length {length} at {p} in frame {frame}");
         }
     }
@@ -42,7 +50,10 @@ fn history_grows_by_a_frame_up_to_the_cap_of_its_roughness() {
 fn noise_fades_while_nothing_moves() {
     let Some(gpu) = Gpu::open() else { return };
     let size = UVec2::new(64, 64);
-    let mut run = Run::new(&gpu, &linear_settings(), size);
+    pipelines().iter().for_each(|settings| assert_fades(Run::new(&gpu, settings, size), size));
+}
+
+fn assert_fades(mut run: Run<'_>, size: UVec2) {
     // The published filter darkens what varies, by about 0.3 times the variance of the noise, which here is
     // 0.03: the error of the first frame is well above that bias, the one of the last frame is mostly it.
     let errors: Vec<f32> = (0..32)
@@ -62,7 +73,10 @@ fn noise_fades_while_nothing_moves() {
 fn storing_history_does_not_darken_it() {
     let Some(gpu) = Gpu::open() else { return };
     let size = UVec2::new(64, 64);
-    let mut run = Run::new(&gpu, &linear_settings(), size);
+    pipelines().iter().for_each(|settings| assert_keeps_brightness(Run::new(&gpu, settings, size), size));
+}
+
+fn assert_keeps_brightness(mut run: Run<'_>, size: UVec2) {
     let mut brightness = 0.0;
     for frame in 0..100 {
         let scene = Scene::new(size, |p| Pixel { radiance: Vec3::splat(0.95 + 0.1 * noise(frame, p)), ..WALL });
@@ -77,8 +91,12 @@ fn storing_history_does_not_darken_it() {
 fn a_reset_frame_is_the_first_frame_of_a_fresh_denoiser() {
     let Some(gpu) = Gpu::open() else { return };
     let size = UVec2::new(45, 38);
-    let mut used = Run::new(&gpu, &linear_settings(), size);
-    let mut fresh = Run::new(&gpu, &linear_settings(), size);
+    for settings in pipelines() {
+        assert_forgets(Run::new(&gpu, &settings, size), Run::new(&gpu, &settings, size), size);
+    }
+}
+
+fn assert_forgets(mut used: Run<'_>, mut fresh: Run<'_>, size: UVec2) {
     for seed in 0..5 {
         used.still(&Scene::noisy_wall(size, seed));
     }
@@ -122,8 +140,8 @@ fn assert_glued_history([now, before]: &[Denoised; 2], step: IVec2) {
     assert!(interior.clone().count() > 500);
     for p in interior {
         assert_eq!(now.length_at(p), 12.0, "at {p}");
-        let was = before.radiance((p.as_ivec2() - step).as_uvec2());
-        let found = Vec3::from_array(now.reprojected[now.index(p)]);
+        let was = Vec3::from_array(before.kept[before.index((p.as_ivec2() - step).as_uvec2())]);
+        let found = Vec3::from_array(now.found[now.index(p)]);
         // Positions are off by rounding, at most 1/1000 of the neighbour's difference, and the result rounds.
         let error = (found / was - 1.0).abs().max_element();
         assert!(error < 2.0 * HALF_STEP, "{found} found for {was} at {p}");
@@ -134,10 +152,12 @@ fn assert_glued_history([now, before]: &[Denoised; 2], step: IVec2) {
 fn history_follows_a_moving_surface() {
     let Some(gpu) = Gpu::open() else { return };
     let size = UVec2::new(96, 80);
-    for step in [IVec2::new(2, 0), IVec2::new(-1, 2)] {
-        let mut run = Run::new(&gpu, &motion_only_settings(), size);
-        let frames = glide(&mut run, size, step, |_| still_frame(size));
-        assert_glued_history(&frames, step);
+    for settings in pipelines().map(by_motion_only) {
+        for step in [IVec2::new(2, 0), IVec2::new(-1, 2)] {
+            let mut run = Run::new(&gpu, &settings, size);
+            let frames = glide(&mut run, size, step, |_| still_frame(size));
+            assert_glued_history(&frames, step);
+        }
     }
 }
 
@@ -146,8 +166,13 @@ fn history_follows_a_moving_camera() {
     let Some(gpu) = Gpu::open() else { return };
     let size = UVec2::new(96, 80);
     let step = IVec2::new(-2, 1);
-    // With the default settings, which here find history by hit distance and camera, not by motion vectors.
-    let mut run = Run::new(&gpu, &linear_settings(), size);
+    // By hit distance and camera, not by motion vectors.
+    for settings in pipelines() {
+        assert_follows(Run::new(&gpu, &settings, size), size, step);
+    }
+}
+
+fn assert_follows(mut run: Run<'_>, size: UVec2, step: IVec2) {
     let camera = still_camera(size);
     // The height of a pixel on the wall; the wall moves on screen against the camera.
     let pixel = WALL.depth * 2.0 / (camera.view_to_clip.y_axis.y * size.y as f32);
@@ -163,8 +188,11 @@ fn history_follows_a_moving_camera() {
 fn what_a_moving_box_uncovers_has_no_history() {
     let Some(gpu) = Gpu::open() else { return };
     let size = UVec2::new(128, 48);
+    pipelines().map(by_motion_only).iter().for_each(|settings| assert_uncovers(Run::new(&gpu, settings, size), size));
+}
+
+fn assert_uncovers(mut run: Run<'_>, size: UVec2) {
     let step = 6;
-    let mut run = Run::new(&gpu, &motion_only_settings(), size);
     for index in 0..8u32 {
         let box_left = 20 + step * index;
         let in_box = |p: UVec2, left: u32| p.x >= left && p.x < left + 40 && (12..36).contains(&p.y);

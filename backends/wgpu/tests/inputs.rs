@@ -4,9 +4,10 @@ mod support;
 
 use glam::{UVec2, Vec2, Vec3};
 use half::f16;
+use limpid::Settings;
 use support::{
-    Denoised, Gpu, HALF_STEP, Images, Pixel, Run, Scene, WALL, jitter_of, linear_settings, motion_only_settings, noise,
-    positions, still_frame,
+    Denoised, Gpu, HALF_STEP, Images, Pixel, Run, Scene, WALL, by_motion_only, jitter_of, linear_settings, noise,
+    pipelines, positions, published_settings, still_frame,
 };
 use wgpu::TextureFormat::{Depth24PlusStencil8, Depth32Float, R8Unorm, Rg16Float, Rgba8Snorm, Rgba16Float};
 
@@ -15,15 +16,20 @@ const SIZE: UVec2 = UVec2::new(72, 56);
 #[test]
 fn jitter_does_not_move_history() {
     let Some(gpu) = Gpu::open() else { return };
-    let mut run = Run::new(&gpu, &linear_settings(), SIZE);
+    assert_unmoved(Run::new(&gpu, &published_settings(), SIZE), Scene::noisy_wall);
+    // What was accumulated and what is added to it are the same where nothing moves.
+    assert_unmoved(Run::new(&gpu, &linear_settings(), SIZE), |size, _| Scene::noisy_wall(size, 0));
+}
+
+fn assert_unmoved(mut run: Run<'_>, scene: fn(UVec2, u32) -> Scene) {
     let mut before = None::<Denoised>;
     for index in 0..5 {
         let mut frame = still_frame(SIZE);
         frame.camera.jitter = jitter_of(index);
-        let denoised = run.frame(&Scene::noisy_wall(SIZE, index), &frame);
-        for (index, found) in denoised.reprojected.iter().enumerate() {
+        let denoised = run.frame(&scene(SIZE, index), &frame);
+        for (index, found) in denoised.found.iter().enumerate() {
             let Some(before) = &before else { break };
-            let was = before.output[index];
+            let was = before.kept[index];
             for channel in 0..3 {
                 // Positions are off by less than 1/1000 pixel, and the result rounds.
                 let error = (found[channel] / was[channel] - 1.0).abs();
@@ -37,8 +43,8 @@ fn jitter_does_not_move_history() {
 #[test]
 fn exposure_scales_and_changes_nothing_else() {
     let Some(gpu) = Gpu::open() else { return };
-    let sequence = |power: f32| {
-        let mut run = Run::new(&gpu, &linear_settings(), SIZE);
+    let sequence = |settings: &Settings, power: f32| {
+        let mut run = Run::new(&gpu, settings, SIZE);
         let frames = (0..4).map(|index| {
             let mut scene = Scene::noisy_wall(SIZE, index);
             scene.pixels.iter_mut().for_each(|pixel| pixel.radiance *= power);
@@ -48,10 +54,9 @@ fn exposure_scales_and_changes_nothing_else() {
         });
         frames.collect::<Vec<_>>()
     };
-    let expected = sequence(1.0);
     // Powers of two only move exponents, so every bit stays the same.
-    for power in [64.0, 1.0 / 64.0] {
-        let scaled = sequence(power).concat();
+    for (settings, power) in pipelines().iter().flat_map(|settings| [(settings, 64.0), (settings, 1.0 / 64.0)]) {
+        let (expected, scaled) = (sequence(settings, 1.0), sequence(settings, power).concat());
         for (actual, expected) in scaled.iter().zip(expected.concat()) {
             let [r, g, b, variance] = expected;
             assert_eq!(*actual, [r * power, g * power, b * power, variance]);
@@ -62,8 +67,10 @@ fn exposure_scales_and_changes_nothing_else() {
 #[test]
 fn exposure_may_change_every_frame() {
     let Some(gpu) = Gpu::open() else { return };
-    let mut run = Run::new(&gpu, &linear_settings(), SIZE);
-    for (index, exposure) in [1.0, 0.01, 100.0, 0.3, 7.0].into_iter().enumerate() {
+    let mut runs = pipelines().map(|settings| Run::new(&gpu, &settings, SIZE));
+    let exposures = [1.0, 0.01, 100.0, 0.3, 7.0].into_iter().enumerate();
+    for ((index, exposure), run) in exposures.flat_map(|frame| [(frame, 0), (frame, 1)]) {
+        let run = &mut runs[run];
         let mut frame = still_frame(SIZE);
         frame.exposure = exposure;
         let denoised = run.frame(&Scene::new(SIZE, |_| WALL), &frame);
@@ -98,8 +105,12 @@ fn cleared_depth(gpu: &Gpu, format: wgpu::TextureFormat, depth: f32) -> wgpu::Te
 #[test]
 fn compact_formats_and_depth_buffers_may_be_given() {
     let Some(gpu) = Gpu::open() else { return };
-    let mut wide = Run::new(&gpu, &motion_only_settings(), SIZE);
-    let mut compact = Run::new(&gpu, &motion_only_settings(), SIZE);
+    pipelines().map(by_motion_only).iter().for_each(|settings| assert_may_be_compact(&gpu, settings));
+}
+
+fn assert_may_be_compact(gpu: &Gpu, settings: &Settings) {
+    let mut wide = Run::new(gpu, settings, SIZE);
+    let mut compact = Run::new(gpu, settings, SIZE);
     for (index, format) in [Depth32Float, Depth32Float, Depth24PlusStencil8].into_iter().enumerate() {
         // All of it has an exact equal in the compact formats, but for 0.5 in 24 bits.
         let scene = Scene::new(SIZE, |p| Pixel {
@@ -120,7 +131,7 @@ fn compact_formats_and_depth_buffers_may_be_given() {
             ),
             normal: gpu.upload(SIZE, Rgba8Snorm, &[0i8, 0, 127, 55].repeat(count)),
             roughness: gpu.upload(SIZE, R8Unorm, &[153u8].repeat(count)),
-            depth: cleared_depth(&gpu, format, 0.5),
+            depth: cleared_depth(gpu, format, 0.5),
             motion: gpu.upload(SIZE, Rg16Float, &halves(&texels(&|p| p.motion.to_array().to_vec()))),
             environment: None,
         };

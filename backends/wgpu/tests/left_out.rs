@@ -5,7 +5,7 @@ mod support;
 use glam::{Mat3, UVec2, Vec2, Vec3};
 use half::f16;
 use limpid::settings::{Fallback, Settings};
-use support::{Gpu, Images, Pixel, Run, SKY, Scene, WALL, linear_settings, noise, positions, still_camera};
+use support::{Gpu, Images, Pixel, Run, SKY, Scene, WALL, noise, pipelines, positions, still_camera};
 
 const SIZE: UVec2 = UVec2::new(75, 43);
 const THRESHOLD: f32 = 0.5;
@@ -50,11 +50,12 @@ fn mixed_scene(seed: u32, kind: impl Fn(UVec2) -> Kind) -> Scene {
     })
 }
 
-fn settings(fallback: Fallback) -> Settings {
-    let mut settings = linear_settings();
-    settings.coverage.roughness_threshold = THRESHOLD;
-    settings.coverage.fallback = fallback;
-    settings
+fn settings(fallback: Fallback) -> [Settings; 2] {
+    pipelines().map(|mut settings| {
+        settings.coverage.roughness_threshold = THRESHOLD;
+        settings.coverage.fallback = fallback;
+        settings
+    })
 }
 
 fn frame() -> limpid::FrameInputs {
@@ -64,8 +65,10 @@ fn frame() -> limpid::FrameInputs {
 #[test]
 fn left_out_pixels_are_black_or_as_they_came() {
     let Some(gpu) = Gpu::open() else { return };
-    for fallback in [Fallback::Black, Fallback::Input] {
-        let mut run = Run::new(&gpu, &settings(fallback), SIZE);
+    let all = [Fallback::Black, Fallback::Input].into_iter().flat_map(|fallback| settings(fallback));
+    for settings in all {
+        let fallback = settings.coverage.fallback;
+        let mut run = Run::new(&gpu, &settings, SIZE);
         for seed in 0..3 {
             let mut scene = mixed_scene(seed, kind_at);
             // The input is passed on as far as it is usable.
@@ -91,7 +94,11 @@ fn left_out_pixels_are_black_or_as_they_came() {
 #[test]
 fn an_image_without_any_reflection_is_all_fallback() {
     let Some(gpu) = Gpu::open() else { return };
-    let mut run = Run::new(&gpu, &settings(Fallback::Input), SIZE);
+    settings(Fallback::Input).iter().for_each(|settings| assert_is_all_fallback(&gpu, settings));
+}
+
+fn assert_is_all_fallback(gpu: &Gpu, settings: &Settings) {
+    let mut run = Run::new(gpu, settings, SIZE);
     // Everything denoised, then nothing, nothing but sky, and everything again: history starts anew.
     for (seed, kind) in [Kind::Denoised, Kind::TooRough, Kind::Sky, Kind::Denoised].into_iter().enumerate() {
         let scene = mixed_scene(seed as u32, |_| kind);
@@ -152,12 +159,17 @@ fn look_up(level: u32, direction: Vec3) -> Vec3 {
 fn left_out_surfaces_mirror_the_environment() {
     let Some(gpu) = Gpu::open() else { return };
     let environment_from_world = Mat3::from_rotation_y(2.2) * Mat3::from_rotation_x(0.4);
-    let mut settings = settings(Fallback::Environment);
-    settings.coverage.environment_mip_scale = MIP_SCALE;
-    settings.coverage.environment_from_world = environment_from_world;
-    let mut run = Run::new(&gpu, &settings, SIZE);
+    for mut settings in settings(Fallback::Environment) {
+        settings.coverage.environment_mip_scale = MIP_SCALE;
+        settings.coverage.environment_from_world = environment_from_world;
+        assert_mirrors(&gpu, &settings, environment_from_world);
+    }
+}
+
+fn assert_mirrors(gpu: &Gpu, settings: &Settings, environment_from_world: Mat3) {
+    let mut run = Run::new(gpu, settings, SIZE);
     let scene = mixed_scene(0, kind_at);
-    let images = Images { environment: Some(environment_map(&gpu)), ..scene.upload(&gpu) };
+    let images = Images { environment: Some(environment_map(gpu)), ..scene.upload(gpu) };
     let denoised = run.images(&images, &frame());
     denoised.assert_usable("environment");
     let projection = still_camera(SIZE).view_to_clip;

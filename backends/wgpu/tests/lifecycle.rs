@@ -7,7 +7,7 @@ use std::sync::mpsc;
 use glam::UVec2;
 use limpid::settings::Fallback;
 use limpid_wgpu::{Denoiser, FRAMES_BEFORE_SUBMIT, Options, PassTime};
-use support::{Denoised, Gpu, Images, Run, Scene, linear_settings, still_frame};
+use support::{Denoised, Gpu, Images, Run, Scene, linear_settings, published_settings, still_frame};
 
 const SIZE: UVec2 = UVec2::new(52, 36);
 
@@ -30,16 +30,16 @@ fn numbers_take_effect_at_once_and_keep_history() {
     for index in 0..3 {
         assert!(run.still(&scene(index)) == unchanged.still(&scene(index)));
     }
-    settings.resolve.stability = 0.0;
+    settings.footprint.filter_scale = 0.1;
     settings.coverage.roughness_threshold = 0.9;
     run.denoiser.set_settings(&settings).unwrap();
     let (changed, unchanged) = (run.still(&scene(3)), unchanged.still(&scene(3)));
     assert!(changed.length == unchanged.length && changed.length.iter().all(|length| *length == 4.0));
-    assert!(changed.reprojected == unchanged.reprojected && changed.output != unchanged.output);
+    assert!(changed.found == unchanged.found && changed.output != unchanged.output);
 
-    settings.resolve.stability = 2.0;
+    settings.footprint.filter_scale = 20.0;
     let refused = run.denoiser.set_settings(&settings).unwrap_err();
-    assert!(refused.to_string().contains("`resolve.stability` is 2"), "{refused}");
+    assert!(refused.to_string().contains("`footprint.filter_scale` is 20"), "{refused}");
     assert!(run.still(&scene(4)).length.iter().all(|length| *length == 5.0));
 }
 
@@ -50,7 +50,7 @@ fn what_changes_the_plan_starts_anew() {
     let mut black = linear_settings();
     black.coverage.fallback = Fallback::Black;
     // The default again in the end: what follows is compared with a denoiser that never was anything else.
-    for (start, settings) in [(0, black), (10, linear_settings())] {
+    for (start, settings) in [(0, black), (5, published_settings()), (10, linear_settings())] {
         run.still(&scene(start));
         run.still(&scene(start + 1));
         run.denoiser.set_settings(&settings).unwrap();
@@ -175,9 +175,9 @@ fn each_pass_is_timed_in_order() {
             continue;
         }
         let times = times(&gpu, &timed).unwrap();
-        let kernels: Vec<&str> = times.iter().map(|time| time.kernel.as_str()).collect();
-        let passes: Vec<&str> = timed.plan().passes.iter().map(|pass| pass.kernel.as_str()).collect();
-        assert_eq!(kernels, passes, "frame {index}");
+        let timed_passes: Vec<&str> = times.iter().map(|time| time.pass.as_str()).collect();
+        let passes: Vec<&str> = timed.plan().passes.iter().map(|pass| pass.name.as_str()).collect();
+        assert_eq!(timed_passes, passes, "frame {index}");
         assert!(times.iter().any(|time| !time.duration.is_zero()), "frame {index}");
     }
 }

@@ -4,7 +4,7 @@ mod support;
 
 use glam::{UVec2, Vec3};
 use limpid::Settings;
-use limpid::settings::{RayList, RaysPerQuad};
+use limpid::settings::{Pipeline, RayList, RaysPerQuad};
 use support::{Gpu, Pixel, Run, SKY, Scene, WALL, linear_settings, noise, positions, still_frame};
 
 const SIZE: UVec2 = UVec2::new(83, 45);
@@ -155,8 +155,12 @@ fn each_denoised_pixel_gets_one_ray_or_copy_and_no_ray_is_wasted() {
 fn pixels_that_vary_get_their_own_rays() {
     let Some(gpu) = Gpu::open() else { return };
     let threshold = 0.02;
-    for rays_per_quad in [RaysPerQuad::One, RaysPerQuad::Two] {
-        let mut run = Run::new(&gpu, &settings(rays_per_quad, Some(threshold)), SIZE);
+    let modes =
+        [RaysPerQuad::One, RaysPerQuad::Two].map(|rays| [Pipeline::Footprint, Pipeline::Published].map(|p| (rays, p)));
+    for (rays_per_quad, pipeline) in modes.into_iter().flatten() {
+        let mut settings = settings(rays_per_quad, Some(threshold));
+        settings.pipeline = pipeline;
+        let mut run = Run::new(&gpu, &settings, SIZE);
         let kinds: Vec<Kind> =
             positions(SIZE).map(|p| if noise(3, p) < 0.3 { Kind::Sky } else { Kind::Glossy }).collect();
         let flickers = |p: UVec2| p.x < 40;
@@ -174,7 +178,7 @@ fn pixels_that_vary_get_their_own_rays() {
             let copies = run.copy_out(&mut encoder, SIZE);
             gpu.queue.submit([encoder.finish()]);
 
-            let what = format!("{rays_per_quad:?}, frame {frame}");
+            let what = format!("{pipeline:?}, {rays_per_quad:?}, frame {frame}");
             assert_covers_each_pixel_once(&rays, &kinds, &what);
             let varies = |p: UVec2| variance[index(p)] > threshold;
             let traced = sorted(rays.iter().map(|ray| ray.pixel).collect());

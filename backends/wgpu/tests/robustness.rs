@@ -3,11 +3,10 @@
 mod support;
 
 use glam::{Mat4, UVec2, Vec2, Vec3};
-use support::{
-    Denoised, Gpu, Images, POISON, Pixel, Run, Scene, WALL, linear_settings, motion_only_settings, noise, positions,
-};
+use limpid::settings::Pipeline;
+use support::{Denoised, Gpu, Images, POISON, Pixel, Run, Scene, WALL, by_motion_only, noise, pipelines, positions};
 
-const SIZE: UVec2 = UVec2::new(64, 64);
+const SIZE: UVec2 = UVec2::new(96, 64);
 /// In the middle of the image, in the tile from (24, 32).
 const BAD: UVec2 = UVec2::new(27, 35);
 const BAD_FRAME: usize = 5;
@@ -65,12 +64,14 @@ fn scene(frame: u32) -> Scene {
     scene
 }
 
-/// What a bad pixel may reach in its own frame: the 8x8 average of its tile is looked up between tiles, 4 pixels
-/// around, and goes from there through the 9x9 statistics, another 4 around.
-fn in_footprint(p: UVec2) -> bool {
-    let tile = (BAD / 8 * 8).as_ivec2();
+/// What a bad pixel may reach in its own frame. Published: the 8x8 average of its tile is looked up between tiles, 4
+/// pixels around, and goes from there through the 9x9 statistics, another 4 around. Footprint: passes over 4x4 blocks
+/// reach one, two and two blocks, and both lookups between blocks another.
+fn in_footprint(pipeline: Pipeline, p: UVec2) -> bool {
+    let (side, reach) = if pipeline == Pipeline::Published { (8, 8) } else { (4, 4 * (1 + 2 + 1 + 2 + 1)) };
+    let first = (BAD / side * side).as_ivec2() - reach;
     let p = p.as_ivec2();
-    p.cmpge(tile - 8).all() && p.cmplt(tile + 16).all()
+    p.cmpge(first).all() && p.cmplt(first + side as i32 + 2 * reach).all()
 }
 
 fn largest_difference(a: &Denoised, b: &Denoised) -> f32 {
@@ -81,7 +82,10 @@ fn largest_difference(a: &Denoised, b: &Denoised) -> f32 {
 fn a_bad_pixel_stays_contained_and_is_forgotten() {
     let Some(gpu) = Gpu::open() else { return };
     let images: Vec<Images> = (0..=RECOVERED_FRAME).map(|index| scene(index).upload(&gpu)).collect();
-    for (settings, spoils) in [(linear_settings(), bad_surfaces()), (motion_only_settings(), bad_motion())] {
+    let all = pipelines()
+        .into_iter()
+        .flat_map(|settings| [(settings.clone(), bad_surfaces()), (by_motion_only(settings), bad_motion())]);
+    for (settings, spoils) in all {
         let mut run = Run::new(&gpu, &settings, SIZE);
         let mut sequence = |spoil: Option<fn(&mut Pixel)>| -> Vec<Denoised> {
             let frames = images.iter().enumerate().map(|(index, clean)| {
@@ -104,7 +108,7 @@ fn a_bad_pixel_stays_contained_and_is_forgotten() {
             for (index, frame) in spoilt.iter().enumerate() {
                 frame.assert_usable(&format!("{what}, frame {index}"));
             }
-            for p in positions(SIZE).filter(|p| !in_footprint(*p)) {
+            for p in positions(SIZE).filter(|p| !in_footprint(settings.pipeline, *p)) {
                 let (spoilt, clean) = (spoilt[BAD_FRAME].radiance(p), clean[BAD_FRAME].radiance(p));
                 assert_eq!(spoilt, clean, "{what} reaches {p}");
             }
@@ -119,7 +123,10 @@ fn a_bad_pixel_stays_contained_and_is_forgotten() {
 #[test]
 fn unusable_radiance_counts_as_no_light() {
     let Some(gpu) = Gpu::open() else { return };
-    let mut run = Run::new(&gpu, &linear_settings(), SIZE);
+    pipelines().iter().for_each(|settings| assert_no_light(Run::new(&gpu, settings, SIZE)));
+}
+
+fn assert_no_light(mut run: Run<'_>) {
     let mut with_radiance_at_bad_pixels = |radiance: Vec3| {
         let frames = (0..3).map(|index| {
             let mut scene = scene(index);
@@ -139,10 +146,13 @@ fn unusable_radiance_counts_as_no_light() {
 
 #[test]
 fn a_wholly_bad_frame_is_forgotten() {
+    let Some(gpu) = Gpu::open() else { return };
+    pipelines().iter().for_each(|settings| assert_forgotten(Run::new(&gpu, settings, SIZE)));
+}
+
+fn assert_forgotten(mut run: Run<'_>) {
     // The largest radiance is 65504, and less than halves each frame.
     const LAST_FRAME: u32 = 24;
-    let Some(gpu) = Gpu::open() else { return };
-    let mut run = Run::new(&gpu, &linear_settings(), SIZE);
     let bad: [(&str, Pixel); 4] = [
         ("nothing usable", POISON),
         ("NaN radiance", Pixel { radiance: Vec3::NAN, ..WALL }),
@@ -174,7 +184,7 @@ fn a_wholly_bad_frame_is_forgotten() {
 fn bad_pixels_everywhere_leave_finite_output() {
     let Some(gpu) = Gpu::open() else { return };
     let spoils: Vec<Spoil> = bad_surfaces().into_iter().chain(bad_motion()).collect();
-    for settings in [linear_settings(), motion_only_settings()] {
+    for settings in pipelines().into_iter().flat_map(|settings| [settings.clone(), by_motion_only(settings)]) {
         let mut run = Run::new(&gpu, &settings, SIZE);
         for index in 0..8 {
             let mut scene = scene(index);

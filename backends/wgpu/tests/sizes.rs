@@ -4,7 +4,7 @@ mod support;
 
 use glam::{UVec2, Vec2, Vec3};
 use limpid::settings::Fallback;
-use support::{Gpu, HALF_STEP, POISON, Pixel, Run, SKY, Scene, WALL, linear_settings, noise, still_frame};
+use support::{Gpu, HALF_STEP, POISON, Pixel, Run, SKY, Scene, WALL, noise, pipelines, still_frame};
 
 const SIZES: [UVec2; 5] =
     [UVec2::new(1, 1), UVec2::new(7, 5), UVec2::new(1, 2000), UVec2::new(333, 217), UVec2::new(16, 16)];
@@ -28,7 +28,10 @@ fn chaos(size: UVec2, seed: u32) -> Scene {
 #[test]
 fn any_size_gives_finite_output_of_chaos() {
     let Some(gpu) = Gpu::open() else { return };
-    let mut run = Run::new(&gpu, &linear_settings(), UVec2::ONE);
+    pipelines().iter().for_each(|settings| assert_finite(Run::new(&gpu, settings, UVec2::ONE)));
+}
+
+fn assert_finite(mut run: Run<'_>) {
     for size in SIZES {
         run.denoiser.resize(size).unwrap();
         for seed in 0..3 {
@@ -40,10 +43,14 @@ fn any_size_gives_finite_output_of_chaos() {
 #[test]
 fn constant_radiance_stays_what_it_is_in_every_pixel() {
     let Some(gpu) = Gpu::open() else { return };
-    let mut settings = linear_settings();
-    settings.coverage.fallback = Fallback::Input;
-    settings.coverage.roughness_threshold = 0.9;
-    let mut run = Run::new(&gpu, &settings, UVec2::ONE);
+    for mut settings in pipelines() {
+        settings.coverage.fallback = Fallback::Input;
+        settings.coverage.roughness_threshold = 0.9;
+        assert_constant(Run::new(&gpu, &settings, UVec2::ONE));
+    }
+}
+
+fn assert_constant(mut run: Run<'_>) {
     // The last one has more tiles than a row of an indirect grid.
     for size in SIZES.into_iter().chain([UVec2::new(1100, 300)]) {
         run.denoiser.resize(size).unwrap();
@@ -70,8 +77,12 @@ fn constant_radiance_stays_what_it_is_in_every_pixel() {
 #[test]
 fn nothing_outside_the_frame_is_read() {
     let Some(gpu) = Gpu::open() else { return };
-    let mut exact = Run::new(&gpu, &linear_settings(), UVec2::ONE);
-    let mut roomy = Run::new(&gpu, &linear_settings(), UVec2::ONE);
+    for settings in pipelines() {
+        assert_reads_inside(Run::new(&gpu, &settings, UVec2::ONE), Run::new(&gpu, &settings, UVec2::ONE));
+    }
+}
+
+fn assert_reads_inside(mut exact: Run<'_>, mut roomy: Run<'_>) {
     for (size, allocated) in [
         (UVec2::new(1, 1), UVec2::new(9, 1)),
         (UVec2::new(33, 17), UVec2::new(64, 64)),
@@ -96,7 +107,10 @@ fn nothing_outside_the_frame_is_read() {
 fn history_survives_a_size_that_changes_every_frame() {
     let Some(gpu) = Gpu::open() else { return };
     let allocated = UVec2::new(120, 90);
-    let mut run = Run::new(&gpu, &linear_settings(), allocated);
+    pipelines().iter().for_each(|settings| assert_survives(Run::new(&gpu, settings, allocated), allocated));
+}
+
+fn assert_survives(mut run: Run<'_>, allocated: UVec2) {
     let sizes = [(120, 90), (80, 60), (96, 72), (61, 45), (120, 90), (40, 30), (120, 90), (101, 77)];
     // Dark to bright from left to right, as a function of uv, so that it is the same at every size.
     let shade = |uv: Vec2| Vec3::new(1.0 + uv.x, 2.0 - uv.x, 1.0 + uv.y);

@@ -173,8 +173,8 @@ fn value_findings(content: &Content, exposure: f32) -> Vec<Finding> {
     let [_, median, _] = content.depth;
     if median > 200.0 || (median > 0.0 && median < 0.05) {
         let found =
-            format!("half of all surfaces are nearer than {median:.3} units; depth_falloff was tuned in metres");
-        let advice = "if a unit is u metres, set prefilter.depth_falloff to 4 * u * u";
+            format!("half of all surfaces are nearer than {median:.3} units; the published pipeline was tuned in metres");
+        let advice = "with preset reference, if a unit is u metres, set prefilter.depth_falloff to 4 * u * u";
         all.push(finding(Note, found, advice));
     }
     all
@@ -196,7 +196,11 @@ fn cost_findings(content: &Content) -> Vec<Finding> {
     }
     if content.roughness_is_constant {
         let found = "all surfaces have the same roughness";
-        all.push(finding(Severity::Note, found, "a texture of one channel and 8 bits holds it"));
+        all.push(finding(Severity::Note, found, "with features.constant_roughness there is no such input"));
+    }
+    if content.mirrors > 0.0 && content.mirrors + content.sky > 0.999_999 {
+        let advice = "nothing is lost without features.outlier_spread and features.light_change";
+        all.push(finding(Severity::Note, "all surfaces are mirrors", advice));
     }
     all
 }

@@ -228,7 +228,7 @@ impl Gpu {
         });
         self.wait()?;
         let times = receiver.try_recv().unwrap_or_default();
-        Ok(times.into_iter().map(|time| (time.kernel, time.duration)).collect())
+        Ok(times.into_iter().map(|time| (time.pass, time.duration)).collect())
     }
 }
 

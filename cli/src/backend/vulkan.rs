@@ -100,7 +100,7 @@ impl Backend for Vulkan {
             timed(&mut time, &mut cpu_time, || session.run(&inputs, &frame_inputs))?;
         }
         let pass_times = session.denoiser().read_times()?.unwrap_or_default();
-        let pass_times = pass_times.into_iter().map(|time| (time.kernel, time.duration)).collect();
+        let pass_times = pass_times.into_iter().map(|time| (time.pass, time.duration)).collect();
         let (radiance, variance) = read_output(context, session.denoiser(), size)?;
         Ok(Denoised { radiance, variance, time, cpu_time, pass_times, rays, traced })
     }

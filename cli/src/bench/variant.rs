@@ -1,7 +1,8 @@
 //! What is compared: presets, single settings, and the pipeline with one feature left out.
 
 use anyhow::Result;
-use limpid::{Preset, Settings};
+use glam::UVec2;
+use limpid::{Plan, Preset, Settings};
 use serde::{Deserialize, Serialize};
 
 /// Why a variant is there.
@@ -40,23 +41,15 @@ pub const NOISY: &str = "noisy";
 /// Name of plain accumulation.
 pub const ACCUMULATION: &str = "accumulation";
 
-/// Name, what is left out, and the constants that leave it out while the code stays.
+/// Name, what is left out of the default preset, and the settings that leave it out without being a feature.
 pub const ABLATIONS: &[(&str, &str, &[&str])] = &[
-    ("no-history", "no temporal accumulation", &["reproject.min_history_cap=1", "reproject.max_history=1"]),
-    ("no-parallax", "no reprojection by hit distance", &["reproject.parallax_normal_cosine=1"]),
-    ("no-colour-gate", "no colour test on surface history", &["reproject.surface_color_gate=10000"]),
-    ("no-disocclusion", "no test of history's normal and depth", &["reproject.disocclusion_threshold=0"]),
-    ("no-prefilter", "no spatial blur", &["prefilter.variance_weight_floor=0", "prefilter.variance_falloff=0"]),
-    ("no-normal-weight", "blur across normals", &["prefilter.normal_power=0"]),
-    ("no-depth-weight", "blur across depth", &["prefilter.depth_falloff=0"]),
-    (
-        "no-radiance-weight",
-        "blur without regard to brightness",
-        &["prefilter.radiance_falloff=0", "prefilter.radiance_variance_falloff=0"],
-    ),
-    ("no-average-weight", "plain 8x8 average", &["reproject.average_luminance_falloff=0"]),
-    ("no-average-pull", "clip box around the neighbourhood's mean", &["resolve.clip_average_pull=0"]),
-    ("no-clipping", "history and colour are not clipped", &["resolve.clip_scale=1000"]),
+    ("short-history", "history counts as one frame", &["accumulate.mirror_history=1", "accumulate.max_history=1"]),
+    ("long-mirror-history", "history of mirrors as long as of other surfaces", &["accumulate.mirror_history=31"]),
+    ("no-outlier-cut", "outliers stay where they are", &["accumulate.outlier_factor=65504"]),
+    ("no-excess", "what is cut off from outliers is lost", &["accumulate.excess_limit=0"]),
+    ("no-disagreement-limit", "two histories apart count in full", &["accumulate.disagreement_limit=1000"]),
+    ("round-footprint", "footprints as wide as long at grazing angles", &["footprint.grazing_width=1"]),
+    ("no-near-taps", "blocks alone", &["features.near_taps=0"]),
 ];
 
 impl Variant {
@@ -86,7 +79,7 @@ impl Variant {
     }
 
     /// The default preset without each of its [`Features`](limpid::settings::Features), whose code is left out, and
-    /// without what [`ABLATIONS`] turn off by constants; `load` turns `PATH=VALUE` options into settings.
+    /// without what [`ABLATIONS`] turn off by other settings; `load` turns `PATH=VALUE` options into settings.
     ///
     /// # Errors
     ///
@@ -122,11 +115,19 @@ impl Variant {
     }
 }
 
-/// Names of the features that settings have on.
+/// Names of the features that settings have on, of their pipeline: without one of another the plan is the same.
 fn features_of(settings: &Settings) -> Result<Vec<String>> {
-    let features = serde_json::to_value(&settings.features)?;
-    let features = features.as_object().into_iter().flatten();
-    Ok(features.filter(|(_, value)| **value == true).map(|(name, _)| name.clone()).collect())
+    let plan = |settings: &Settings| Plan::new(settings, UVec2::ONE).map(|(plan, _)| plan);
+    let (whole, json) = (plan(settings)?, serde_json::to_value(settings)?);
+    let mut names = Vec::new();
+    for (name, _) in json["features"].as_object().into_iter().flatten().filter(|(_, value)| **value == true) {
+        let mut json = json.clone();
+        json["features"][name] = false.into();
+        if plan(&serde_json::from_value(json)?)? != whole {
+            names.push(name.clone());
+        }
+    }
+    Ok(names)
 }
 
 fn split_values(text: &str) -> Vec<String> {

@@ -16,7 +16,7 @@ pub(crate) struct SettingsOptions {
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     /// Features to turn on or, with `-` before the name, off, or to give a value, such as
-    /// -history_search,-edge_repair,constant_roughness=0.3. docs/features.md lists them.
+    /// -light_change,near_taps=8,constant_roughness=0.3. docs/features.md lists them.
     #[arg(long, value_name = "[-]NAME[=VALUE],...", value_delimiter = ',', allow_hyphen_values = true)]
     features: Vec<String>,
     /// One setting by its path, such as resolve.stability=0.5. Can be given more than once.

@@ -67,7 +67,7 @@ pub fn on_this_device(settings: &Settings, sources: &Sources) -> Result<Cost> {
     let (plan, kernels) = Plan::from_sources(settings, UVec2::splat(16), sources)?;
     let core = limpid::Denoiser::with_plan(settings, plan, kernels);
     let passes = context.statistics(&core)?.into_iter().map(|pass| PassCost {
-        pass: pass.kernel,
+        pass: pass.pass,
         executable: pass.executable,
         subgroup_size: pass.subgroup_size,
         // A hash is no quantity.

@@ -1,21 +1,25 @@
 //! Settings that together switch everything on and off that changes code.
 
-use limpid::settings::{Fallback, NormalEncoding, RayList, RaysPerQuad, RoughnessEncoding};
-use limpid::{Preset, Settings};
+use glam::UVec2;
+use limpid::settings::{Fallback, NormalEncoding, Pipeline, RayList, RaysPerQuad, RoughnessEncoding};
+use limpid::{Plan, Preset, Settings};
 use limpid_harness::strategy::any_features;
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::TestRunner;
 
-/// The preset with each feature turned the other way, one at a time.
+/// The preset with each feature of its pipeline turned the other way, one at a time.
 fn toggled(name: &str, preset: &Settings) -> Vec<(String, Settings)> {
     let json = serde_json::to_value(preset).unwrap();
+    let plan = |settings: &Settings| Plan::new(settings, UVec2::ONE).map(|(plan, _)| plan).ok();
+    let whole = plan(preset);
     let features = json["features"].as_object().unwrap();
     let toggle = |(feature, value): (&String, &serde_json::Value)| {
         let mut json = json.clone();
         json["features"][feature] = (!value.as_bool()?).into();
         let settings: Settings = serde_json::from_value(json).unwrap();
-        // Of some features one has to be on.
-        settings.validate().is_ok().then(|| (format!("{name}, other {feature}"), settings))
+        // Of some features one has to be on; those of the other pipeline change nothing.
+        let other = plan(&settings);
+        (other.is_some() && other != whole).then(|| (format!("{name}, other {feature}"), settings))
     };
     features.iter().filter_map(toggle).collect()
 }
@@ -43,7 +47,10 @@ fn mixed() -> Vec<Settings> {
         settings.features = any_features().new_tree(&mut random).unwrap().current();
     }
     paired.features.constant_roughness = Some(0.3);
-    vec![mirrored, sparse, paired]
+    paired.pipeline = Pipeline::Published;
+    let mut footprints = paired.clone();
+    footprints.pipeline = Pipeline::Footprint;
+    vec![mirrored, sparse, paired, footprints]
 }
 
 /// Every preset, every preset with each feature turned, and mixtures.

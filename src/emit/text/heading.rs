@@ -41,7 +41,7 @@ impl Writer<'_> {
         lines.push(String::new());
         let version = env!("CARGO_PKG_VERSION");
         let settings = note.settings.as_ref().map(|hash| format!(", settings {hash}")).unwrap_or_default();
-        lines.push(format!("Written by limpid {version} from kernels/{}.wgsl{settings}.", self.kernel.name));
+        lines.push(format!("Written by limpid {version} from kernels/{}.wgsl{settings}.", self.kernel.file));
         lines.push("SPDX-License-Identifier: MIT OR Apache-2.0".to_owned());
         lines.iter().map(|line| format!("// {line}").trim_end().to_owned() + "\n").collect()
     }

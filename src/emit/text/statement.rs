@@ -77,7 +77,7 @@ impl<'a> Writer<'a> {
                 }
             }
         }
-        let line = self.source.declaration(&format!("fn {}", self.kernel.name));
+        let line = self.source.declaration(&format!("fn {}", self.kernel.file));
         scope.commented.extend(line);
         let mut text = self.language.entry_point(self.kernel, &arguments) + &memory;
         let body = std::mem::take(&mut scope.outline.body);

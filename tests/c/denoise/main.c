@@ -85,8 +85,9 @@ static void upload_frame(const Sequence *sequence, VkCommandBuffer commands, uin
     }
 }
 
-static LimpidInputs read_inputs(const Json *frame) {
+static LimpidInputs read_inputs(const Json *frame, uint32_t number) {
     LimpidInputs inputs;
+    inputs.index = number;
     json_floats(frame, "world_to_view", inputs.camera.world_to_view, 16);
     json_floats(frame, "view_to_clip", inputs.camera.view_to_clip, 16);
     json_floats(frame, "jitter", inputs.camera.jitter, 2);
@@ -146,7 +147,7 @@ int main(int count, char **arguments) {
     LimpidPrevious previous;
     uint32_t number = 0;
     for (const Json *entry = sequence.frames->first; entry != NULL; entry = entry->next, number++) {
-        const LimpidInputs frame = read_inputs(entry);
+        const LimpidInputs frame = read_inputs(entry, number);
         const char *problem =
             limpid_fill_constants(&settings, &frame, number > 0 ? &previous : NULL, denoiser_constants(denoiser));
         if (problem != NULL) {

@@ -9,7 +9,7 @@ use glam::{Mat4, UVec2, Vec2, Vec3, camera::rh};
 use half::f16;
 use limpid::resource::Copy;
 use limpid::settings::DepthEncoding;
-use limpid::{Camera, FrameInputs, Settings};
+use limpid::{Camera, FrameInputs, Preset, Settings};
 use limpid_wgpu::{Denoiser, Inputs, Options};
 use wgpu::TextureFormat::{R32Float, Rg32Float, Rgba32Float};
 
@@ -194,11 +194,22 @@ pub(crate) fn linear_settings() -> Settings {
     settings
 }
 
-/// Those, with history found by motion vectors alone and whatever its colour.
-pub(crate) fn motion_only_settings() -> Settings {
+/// The same for the published pipeline, which denoises all surfaces.
+pub(crate) fn published_settings() -> Settings {
     let mut settings = linear_settings();
-    // No cosine is above 1.
-    settings.reproject.parallax_normal_cosine = 1.0;
+    settings.pipeline = Preset::Reference.settings().pipeline;
+    settings
+}
+
+/// Both.
+pub(crate) fn pipelines() -> [Settings; 2] {
+    [linear_settings(), published_settings()]
+}
+
+/// Settings with history found by motion vectors alone and whatever its colour.
+pub(crate) fn by_motion_only(mut settings: Settings) -> Settings {
+    settings.features.mirror_parallax = false;
+    settings.features.light_change = false;
     settings.reproject.surface_color_gate = 10_000.0;
     settings
 }
@@ -350,8 +361,10 @@ pub(crate) struct Denoised {
     pub(crate) size: UVec2,
     /// `rgb`: radiance, `a`: variance.
     pub(crate) output: Vec<[f32; 4]>,
-    /// Radiance found in last frame's output.
-    pub(crate) reprojected: Vec<[f32; 3]>,
+    /// Radiance that was found in history; in the footprint pipeline, with this frame's added to it.
+    pub(crate) found: Vec<[f32; 3]>,
+    /// Radiance that the next frame finds.
+    pub(crate) kept: Vec<[f32; 3]>,
     /// Frames that the history holds.
     pub(crate) length: Vec<f32>,
 }
@@ -383,14 +396,12 @@ impl Denoised {
 pub(crate) struct Run<'g> {
     pub(crate) gpu: &'g Gpu,
     pub(crate) denoiser: Denoiser,
-    length_steps: f32,
 }
 
 impl<'g> Run<'g> {
     pub(crate) fn new(gpu: &'g Gpu, settings: &Settings, size: UVec2) -> Self {
         let options = Options { readable_intermediates: true, ..Default::default() };
-        let denoiser = Denoiser::new(&gpu.device, settings, size, options).unwrap();
-        Self { gpu, denoiser, length_steps: (255.0 / settings.reproject.max_history).floor() }
+        Self { gpu, denoiser: Denoiser::new(&gpu.device, settings, size, options).unwrap() }
     }
 
     /// Denoises a frame from images that fit exactly, with a camera at rest.
@@ -410,20 +421,35 @@ impl<'g> Run<'g> {
         self.read(&copies)
     }
 
-    /// Records copies of the output and of the reprojected signal.
-    pub(crate) fn copy_out(&self, encoder: &mut wgpu::CommandEncoder, size: UVec2) -> [TextureCopy; 2] {
-        let signal = self.denoiser.intermediate_texture("signal", Copy::Current).unwrap();
-        [self.denoiser.output_texture(), signal].map(|texture| self.gpu.copy_out(encoder, texture, size))
+    fn is_published(&self) -> bool {
+        self.denoiser.plan().resource("signal").is_some()
     }
 
-    pub(crate) fn read(&self, [output, signal]: &[TextureCopy; 2]) -> Denoised {
-        let words: Vec<[u32; 2]> = self.gpu.read_texels(signal);
+    /// Records copies of the output and of what there is of history.
+    pub(crate) fn copy_out(&self, encoder: &mut wgpu::CommandEncoder, size: UVec2) -> [TextureCopy; 2] {
+        let name = if self.is_published() { "signal" } else { "history" };
+        let history = self.denoiser.intermediate_texture(name, Copy::Current).unwrap();
+        [self.denoiser.output_texture(), history].map(|texture| self.gpu.copy_out(encoder, texture, size))
+    }
+
+    pub(crate) fn read(&self, [output, history]: &[TextureCopy; 2]) -> Denoised {
+        let texels = self.gpu.read_texels::<[f16; 4]>(output);
+        let output_radiance = texels.iter().map(|&[r, g, b, _]| [r, g, b].map(f16::to_f32));
+        let words: Vec<[u32; 2]> = self.gpu.read_texels(history);
         let half = |word: u32| f16::from_bits(word as u16).to_f32();
+        let found: Vec<_> = words.iter().map(|&[rg, b]| [half(rg), half(rg >> 16), half(b)]).collect();
+        let is_published = self.is_published();
+        let length_of = |word: u32| match is_published {
+            // In steps of a seventh of a frame, as the longest history is 32 frames.
+            true => ((word >> 16) & 255) as f32 / 7.0,
+            false => ((word >> 16) & 31) as f32,
+        };
         Denoised {
             size: output.size,
-            output: self.gpu.read_texels::<[f16; 4]>(output).iter().map(|texel| texel.map(f16::to_f32)).collect(),
-            reprojected: words.iter().map(|&[rg, b]| [half(rg), half(rg >> 16), half(b)]).collect(),
-            length: words.iter().map(|&[_, word]| ((word >> 16) & 255) as f32 / self.length_steps).collect(),
+            kept: if is_published { output_radiance.collect() } else { found.clone() },
+            output: texels.iter().map(|texel| texel.map(f16::to_f32)).collect(),
+            found,
+            length: words.iter().map(|&[_, word]| length_of(word)).collect(),
         }
     }
 }
