@@ -455,9 +455,9 @@ numeric_settings! {
         excess_limit = 8.0, 0.0 to 65504.0;
         /// How long history may be where the surface's motion and the reflected point's lie one footprint apart, in
         /// frames.
-        disagreement_limit = 0.4, 0.0 to 1000.0;
+        disagreement_limit = 0.25, 0.0 to 1000.0;
         /// Standard errors of brightness by which light has to change for history to be forgotten.
-        light_change_sigma = 4.0, 0.1 to 1000.0;
+        light_change_sigma = 3.25, 0.1 to 1000.0;
         /// Share of the brightness that it has to change by besides.
         light_change_share = 0.15, 0.0 to 1000.0;
     }
