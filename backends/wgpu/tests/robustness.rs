@@ -66,9 +66,9 @@ fn scene(frame: u32) -> Scene {
 
 /// What a bad pixel may reach in its own frame. Published: the 8x8 average of its tile is looked up between tiles, 4
 /// pixels around, and goes from there through the 9x9 statistics, another 4 around. Footprint: passes over 4x4 blocks
-/// reach one, two and two blocks, and both lookups between blocks another.
+/// reach one, three and three blocks, as their grid may be turned, and both lookups between blocks another.
 fn in_footprint(pipeline: Pipeline, p: UVec2) -> bool {
-    let (side, reach) = if pipeline == Pipeline::Published { (8, 8) } else { (4, 4 * (1 + 2 + 1 + 2 + 1)) };
+    let (side, reach) = if pipeline == Pipeline::Published { (8, 8) } else { (4, 4 * (1 + 3 + 1 + 3 + 1)) };
     let first = (BAD / side * side).as_ivec2() - reach;
     let p = p.as_ivec2();
     p.cmpge(first).all() && p.cmplt(first + side as i32 + 2 * reach).all()
