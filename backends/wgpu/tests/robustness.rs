@@ -114,8 +114,13 @@ fn a_bad_pixel_stays_contained_and_is_forgotten() {
             }
             let difference = |index: usize| largest_difference(&spoilt[index], &clean[index]);
             let (at_once, lasting) = (difference(BAD_FRAME), difference(spoilt.len() - 1));
-            // A history that starts anew leaves a little more noise; an outlier fades to 1/5000 in 25 frames.
-            assert!(lasting < 0.02 + at_once / 5000.0, "{what} differs by {at_once} at once, {lasting} at last");
+            // A history that starts anew leaves a little more noise. An outlier is clipped in the published pipeline, to
+            // 1/5000 in 25 frames; in the other one what was kept of it stays in the mean of all frames.
+            let kept = match settings.pipeline {
+                Pipeline::Published => 1.0 / 5000.0,
+                _ => 1.1 * (BAD_FRAME + 1) as f32 / (RECOVERED_FRAME + 1) as f32,
+            };
+            assert!(lasting < 0.02 + at_once * kept, "{what} differs by {at_once} at once, {lasting} at last");
         }
     }
 }
