@@ -7,10 +7,12 @@ const KNOWN: &[(&str, &str, &[&str], &str)] = &[
     ("from the largest half float", "settling", PUBLISHED, FLOOR),
     ("noise darker by 1e4", "settling", PUBLISHED, FLOOR),
     ("fireflies at random", "energy", PUBLISHED, DARKENS),
+    ("fireflies at random", "energy", FOOTPRINT, LIMITED),
     ("noise of a factor", "energy", PUBLISHED, DARKENS),
 ];
 
 const ALL: &[&str] = &["default", "fast", "reference"];
+const FOOTPRINT: &[&str] = &["default", "fast"];
 const PUBLISHED: &[&str] = &["reference"];
 
 const SATURATES: &str =
@@ -18,6 +20,8 @@ const SATURATES: &str =
 const FLOOR: &str = "the published box that history is clipped to is at least 0.001 of exposed radiance wide: what is \
                      ten times brighter or less stays up to that much too bright until history has faded";
 const DARKENS: &str = "the published pipeline darkens: its 8x8 average and prefilter prefer dark pixels";
+const LIMITED: &str = "what is cut off from outliers comes back up to `accumulate.excess_limit` times the mean around: \
+                       of samples a million times brighter hardly any of it";
 
 /// Why a criterion need not hold of a case with a preset.
 pub(super) fn reason(case: &str, criterion: &str, preset: &str) -> Option<&'static str> {
