@@ -150,6 +150,7 @@ fn c_and_rust_fill_the_same_constants() {
         settings.reproject.max_history = 21.0;
         settings.resolve.stability = 0.3;
         settings.footprint.filter_scale = 0.7;
+        settings.features.constant_roughness = (number == 1).then_some(0.3);
         let files = bundle(&settings, &Options { targets: Vec::new(), ..Options::default() }).unwrap();
         let header = files.iter().find(|file| file.path == "limpid.h").unwrap();
         std::fs::write(folder.join("limpid.h"), &header.bytes).unwrap();

@@ -66,7 +66,7 @@ fn single_shaders_are_printed() {
     let shader = String::from_utf8(succeeds(&["--stdout", "--target", "wgsl", "--pass", "fill"])).unwrap();
     assert!(shader.contains("fn fill(") && shader.contains("settings "), "{shader}");
     let all = String::from_utf8(succeeds(&["--stdout", "--target", "hlsl", "--single-file"])).unwrap();
-    assert!(all.contains("#ifdef LIMPID_FILL") && all.contains("void resolve_temporal("));
+    assert!(all.contains("#ifdef LIMPID_FILL") && all.contains("void lobe_filter("));
     let schema: serde_json::Value = serde_json::from_slice(&succeeds(&["--schema"])).unwrap();
     assert!(schema["properties"]["passes"].is_object());
     fails(&["--stdout", "--target", "hlsl", "--pass", "nothing"], 1, &["`nothing`", "classify, fill"]);

@@ -13,7 +13,7 @@ use crate::{Camera, Error, FrameInputs};
 /// The fields of the constant buffer that settings go to unchanged.
 fn setting_fields() -> impl Iterator<Item = &'static (&'static str, usize, usize)> {
     let from = FrameConstants::FIELDS.iter().skip_while(|(name, ..)| *name != "roughness_threshold");
-    from.take_while(|(name, ..)| *name != "history_length_steps")
+    from.filter(|(name, ..)| *name != "history_length_steps")
 }
 
 /// A float as C writes it.

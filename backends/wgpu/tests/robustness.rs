@@ -66,9 +66,9 @@ fn scene(frame: u32) -> Scene {
 
 /// What a bad pixel may reach in its own frame. Published: the 8x8 average of its tile is looked up between tiles, 4
 /// pixels around, and goes from there through the 9x9 statistics, another 4 around. Footprint: passes over 4x4 blocks
-/// reach one, two and two blocks, and both lookups between blocks another.
+/// reach one, three and three blocks, as their grid may be turned, and both lookups between blocks another.
 fn in_footprint(pipeline: Pipeline, p: UVec2) -> bool {
-    let (side, reach) = if pipeline == Pipeline::Published { (8, 8) } else { (4, 4 * (1 + 2 + 1 + 2 + 1)) };
+    let (side, reach) = if pipeline == Pipeline::Published { (8, 8) } else { (4, 4 * (1 + 3 + 1 + 3 + 1)) };
     let first = (BAD / side * side).as_ivec2() - reach;
     let p = p.as_ivec2();
     p.cmpge(first).all() && p.cmplt(first + side as i32 + 2 * reach).all()
@@ -114,8 +114,13 @@ fn a_bad_pixel_stays_contained_and_is_forgotten() {
             }
             let difference = |index: usize| largest_difference(&spoilt[index], &clean[index]);
             let (at_once, lasting) = (difference(BAD_FRAME), difference(spoilt.len() - 1));
-            // A history that starts anew leaves a little more noise; an outlier fades to 1/5000 in 25 frames.
-            assert!(lasting < 0.02 + at_once / 5000.0, "{what} differs by {at_once} at once, {lasting} at last");
+            // A history that starts anew leaves a little more noise. An outlier is clipped in the published pipeline, to
+            // 1/5000 in 25 frames; in the other one what was kept of it stays in the mean of all frames.
+            let kept = match settings.pipeline {
+                Pipeline::Published => 1.0 / 5000.0,
+                _ => 1.1 * (BAD_FRAME + 1) as f32 / (RECOVERED_FRAME + 1) as f32,
+            };
+            assert!(lasting < 0.02 + at_once * kept, "{what} differs by {at_once} at once, {lasting} at last");
         }
     }
 }

@@ -172,8 +172,9 @@ fn value_findings(content: &Content, exposure: f32) -> Vec<Finding> {
     }
     let [_, median, _] = content.depth;
     if median > 200.0 || (median > 0.0 && median < 0.05) {
-        let found =
-            format!("half of all surfaces are nearer than {median:.3} units; the published pipeline was tuned in metres");
+        let found = format!(
+            "half of all surfaces are nearer than {median:.3} units; the published pipeline was tuned in metres"
+        );
         let advice = "with preset reference, if a unit is u metres, set prefilter.depth_falloff to 4 * u * u";
         all.push(finding(Note, found, advice));
     }

@@ -282,7 +282,7 @@ pub fn run_case(case: &Case, (name, preset): (&'static str, Preset), choice: Cho
             measured: Some(finding.measured).filter(|measured| measured.is_finite()),
             limit: finding.limit,
             passed,
-            known: known::reason(&case.name, finding.name).filter(|_| !passed),
+            known: known::reason(&case.name, finding.name, name).filter(|_| !passed),
             worst: finding.worst,
         }
     };
