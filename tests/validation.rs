@@ -65,7 +65,7 @@ fn a_frame_has_few_barriers_and_its_passes_have_times() {
         assert_eq!(counts, (dispatches, barriers, descriptor_writes));
         let times = denoiser.read_times().unwrap().expect("the device has finished");
         let passes = denoiser.plan().passes.iter().map(|pass| pass.name.as_str());
-        assert!(times.iter().map(|time| time.kernel.as_str()).eq(passes));
+        assert!(times.iter().map(|time| time.pass.as_str()).eq(passes));
         assert!(times.iter().any(|time| !time.duration.is_zero()));
     }
 }
