@@ -56,7 +56,7 @@ fn block_spread(@builtin(global_invocation_id) id: vec3<u32>) {
         let penalty = plane_penalty(plane, tap.guide, block_place(at));
         let fits = tap.guide.denoised && all(at == center + vec2<i32>(offset));
         if ACCUMULATED {
-            let apart = (tap.share - block.share) / SHARE_TOLERANCE;
+            let apart = (tap.share - block.share) * (1.0 / SHARE_TOLERANCE);
             sum += vec4<f32>(tap.radiance, 1.0) * select(0.0, exp(-penalty - apart * apart - 1.2 * dot(rho, rho)), fits);
         } else {
             sum += vec4<f32>(tap.excess, 1.0) * select(0.0, exp(-penalty - 0.6 * dot(rho, rho)), fits);

@@ -88,7 +88,7 @@ fn block_statistics(@builtin(global_invocation_id) id: vec3<u32>) {
         let offset = vec2<i32>(i % 3, i / 3) - 1;
         let at = clamp(center + offset, vec2<i32>(0), last);
         let tap = unpack_block(textureLoad(in_blocks, at, 0));
-        let penalty = plane_penalty(plane, tap.guide, block_place(at)) + 0.4 * f32(dot(offset, offset));
+        let penalty = plane_penalty(plane, tap.guide, block_place(at)) + 0.4 * dot(vec2<f32>(offset), vec2<f32>(offset));
         let w = select(0.0, exp(-penalty), tap.guide.denoised && all(at == center + offset));
         radiance += vec4<f32>(tap.radiance, 1.0) * w;
         excess += tap.excess * w;

@@ -116,7 +116,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
         let radiance = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
         let kept = radiance * mix(1.0, min(1.0, glint / luminance(radiance)), sharp);
         let rho = vec2<f32>(dot(offset, footprint.axis), dot(offset, side)) * falloff;
-        let apart = (history.share - own.share) / SHARE_TOLERANCE;
+        let apart = (history.share - own.share) * (1.0 / SHARE_TOLERANCE);
         let brighter = brightness(radiance) - own_brightness;
         let penalty = plane_penalty(plane, tap, vec2<f32>(texel) + 0.5) + 1.2 * dot(rho, rho) + apart * apart
             + noise_falloff * brighter * brighter;

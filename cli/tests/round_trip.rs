@@ -66,13 +66,9 @@ fn assert_same(mut detour: Detour) {
 }
 
 /// What DXC makes of `mul(matrix, vector)` in a column-major world is a vector times a transposed matrix, of which Mesa adds
-/// up the products in another order than of a matrix times a vector: with the matrices the other way round, and columns
-/// one by one where a vector is multiplied by a matrix, the order is that of naga.
-const SAME_ORDER: &str = "#define column_major row_major
-float4 in_order(row_major float4x4 m, float4 v) { return mul(v, m); }
-float4 in_order(float4 v, row_major float4x4 m) { return float4(dot(v, m[0]), dot(v, m[1]), dot(v, m[2]), dot(v, m[3])); }
-#define mul in_order
-";
+/// up the products in another order than of a matrix times a vector: with the matrices the other way round, the order is
+/// that of naga.
+const SAME_ORDER: [&str; 4] = ["-D", "column_major=row_major", "-D", "mul(m, v)=mul(v, m)"];
 
 #[test]
 fn hlsl_compiled_by_dxc_computes_the_same() {
@@ -80,7 +76,7 @@ fn hlsl_compiled_by_dxc_computes_the_same() {
     let text = |kernel: &Kernel| kernel.hlsl(&HlslOptions { vk_binding: true, ..HlslOptions::default() }).unwrap();
     assert_same(Detour::new(text, move |entry_point, text| {
         let arguments = ["-T", "cs_6_0", "-E", entry_point, "-WX", "-spirv"];
-        tools::compile_hlsl(&compiler, &format!("{SAME_ORDER}{text}"), &arguments)
+        tools::compile_hlsl(&compiler, text, &[&arguments[..], &SAME_ORDER].concat())
     }));
 }
 

@@ -65,7 +65,7 @@ fn frame() -> limpid::FrameInputs {
 #[test]
 fn left_out_pixels_are_black_or_as_they_came() {
     let Some(gpu) = Gpu::open() else { return };
-    let all = [Fallback::Black, Fallback::Input].into_iter().flat_map(|fallback| settings(fallback));
+    let all = [Fallback::Black, Fallback::Input].into_iter().flat_map(settings);
     for settings in all {
         let fallback = settings.coverage.fallback;
         let mut run = Run::new(&gpu, &settings, SIZE);
