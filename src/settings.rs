@@ -272,7 +272,7 @@ pub struct Features {
     pub average_mixing: bool,
     /// Footprint pipeline: forgets history where the light changed.
     pub light_change: bool,
-    /// Footprint pipeline: cuts outliers off and spreads what was cut off, so that no energy is lost. An input without
+    /// Footprint pipeline: cuts outliers off and adds what was cut off, spread, up to a limit. An input without
     /// fireflies needs none of it.
     pub outlier_spread: bool,
     /// Footprint pipeline: filters over blocks where the footprint is wider than a few pixels. A scene of smooth
