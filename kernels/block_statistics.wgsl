@@ -32,8 +32,6 @@ override SURFACE_MOTION: bool = true;
 
 // A change counts beyond this, standard errors and a share of the brightness.
 const LIGHT_FLOOR: f32 = 0.01;
-// Share of this frame in the typical brightness.
-const LIGHT_RATE: f32 = 0.15;
 
 // Brightness that last frames had typically, where the surface was; 0 where it is not known.
 fn known_brightness(block: vec2<i32>, position: vec3<f32>) -> f32 {
@@ -117,7 +115,7 @@ fn block_statistics(@builtin(global_invocation_id) id: vec3<u32>) {
         let known = known_brightness(center, position);
         let tolerance = frame.light_change_sigma * sqrt(variance) + frame.light_change_share * known + LIGHT_FLOOR;
         let changed = select(0.0, smoothstep(1.0, 2.0, abs(typical - known) / tolerance), known > 0.0);
-        let kept = select(typical, mix(known, typical, max(LIGHT_RATE, changed)), known > 0.0);
+        let kept = select(typical, mix(known, typical, max(frame.light_change_rate, changed)), known > 0.0);
         textureStore(out_light, center, vec4<u32>(pack2x16float(vec2<f32>(luminance_to_keep(kept), changed)), 0u, 0u, 0u));
     }
 }

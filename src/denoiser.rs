@@ -124,7 +124,7 @@ impl Denoiser {
     /// [`Error::Size`], [`Error::Camera`] or [`Error::FrameInput`]; the denoiser is as before then.
     pub fn next_frame(&mut self, inputs: &FrameInputs) -> Result<FrameSchedule, Error> {
         let previous = if self.started.is_some() { None } else { self.previous };
-        let constants = frame::constants(&self.settings, inputs, self.plan.size, previous, self.frame_index)?;
+        let constants = frame::constants(&self.settings, inputs, self.plan.size, previous)?;
         let phase = (self.frame_index % 2) as usize;
         self.frame_index = self.frame_index.wrapping_add(1);
         self.previous = Some(Previous { camera: inputs.camera, size: inputs.size });

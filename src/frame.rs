@@ -85,7 +85,6 @@ constants! {
         prev_size: [u32; 2],
         exposure: f32,
         inverse_exposure: f32,
-        frame_index: u32,
         pixels_per_unit: f32,
         roughness_threshold: f32,
         mirror_roughness: f32,
@@ -126,6 +125,7 @@ constants! {
         disagreement_limit: f32,
         light_change_sigma: f32,
         light_change_share: f32,
+        light_change_rate: f32,
         filter_scale: f32,
         excess_scale: f32,
         grazing_width: f32,
@@ -227,7 +227,6 @@ pub(crate) fn constants(
     inputs: &FrameInputs,
     allocated: UVec2,
     previous: Option<Previous>,
-    frame_index: u32,
 ) -> Result<FrameConstants, Error> {
     check_frame(inputs, allocated)?;
     let camera = &inputs.camera;
@@ -300,7 +299,6 @@ pub(crate) fn constants(
         prev_size: if previous.is_some() && !inputs.reset { prev_size.to_array() } else { [0, 0] },
         exposure: inputs.exposure,
         inverse_exposure: 1.0 / inputs.exposure,
-        frame_index,
         pixels_per_unit: (size.y * p.y_axis.y.abs() / 2.0) as f32,
         roughness_threshold: settings.coverage.roughness_threshold,
         mirror_roughness: settings.coverage.mirror_roughness,
@@ -341,6 +339,7 @@ pub(crate) fn constants(
         disagreement_limit: accumulate.disagreement_limit,
         light_change_sigma: accumulate.light_change_sigma,
         light_change_share: accumulate.light_change_share,
+        light_change_rate: accumulate.light_change_rate,
         filter_scale: footprint.filter_scale,
         excess_scale: footprint.excess_scale,
         grazing_width: footprint.grazing_width,

@@ -460,6 +460,8 @@ numeric_settings! {
         light_change_sigma = 3.25, 0.1 to 1000.0;
         /// Share of the brightness that it has to change by besides.
         light_change_share = 0.15, 0.0 to 1000.0;
+        /// Share of each frame in the brightness that it is compared with next.
+        light_change_rate = 0.15, 0.001 to 1.0;
     }
 }
 

@@ -30,8 +30,6 @@ struct Frame {
     prev_size: vec2<u32>,
     exposure: f32,
     inverse_exposure: f32,
-    // Counts frames since the denoiser was made.
-    frame_index: u32,
     // Pixels that a unit of length covers, at a depth of one unit where the camera has a perspective.
     pixels_per_unit: f32,
 
@@ -75,6 +73,7 @@ struct Frame {
     disagreement_limit: f32,
     light_change_sigma: f32,
     light_change_share: f32,
+    light_change_rate: f32,
     filter_scale: f32,
     excess_scale: f32,
     grazing_width: f32,

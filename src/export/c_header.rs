@@ -79,7 +79,7 @@ impl Export<'_> {
         let size = UVec2::new(16, 16);
         let view_to_clip = rh::proj::directx::perspective(1.0, 1.0, 0.1, 10.0);
         let camera = Camera { world_to_view: Mat4::IDENTITY, view_to_clip, jitter: Vec2::ZERO };
-        frame::constants(self.settings, &FrameInputs::new(camera, size), size, None, 0)
+        frame::constants(self.settings, &FrameInputs::new(camera, size), size, None)
     }
 
     fn settings_struct(&self) -> Result<String, Error> {

@@ -12,7 +12,6 @@ typedef struct LimpidInputs {
     LimpidCamera camera;
     uint32_t size[2]; /* pixels of this frame, at most those allocated */
     float exposure;   /* factor that brings radiance near 1, above 0 */
-    uint32_t index;   /* of this frame: counts from 0 */
     int reset;        /* not 0: history is of no use (camera cut) */
 } LimpidInputs;
 
@@ -258,7 +257,6 @@ static inline const char *limpid_fill_constants(
     }
     frame->exposure = inputs->exposure;
     frame->inverse_exposure = 1.0f / inputs->exposure;
-    frame->frame_index = inputs->index;
     limpid_copy_settings(settings, frame);
     frame->history_length_steps = floorf(255.0f / settings->max_history);
     return NULL;

@@ -35,7 +35,7 @@ fn bytes(resource: &Resource) -> Option<String> {
 
 /// Whether a field of the constants is unsigned; the others are floats.
 pub(super) fn is_unsigned(name: &str) -> bool {
-    matches!(name, "size" | "prev_size" | "frame_index")
+    matches!(name, "size" | "prev_size")
 }
 
 /// Type of a field by its size.

@@ -87,7 +87,6 @@ static void upload_frame(const Sequence *sequence, VkCommandBuffer commands, uin
 
 static LimpidInputs read_inputs(const Json *frame, uint32_t number) {
     LimpidInputs inputs;
-    inputs.index = number;
     json_floats(frame, "world_to_view", inputs.camera.world_to_view, 16);
     json_floats(frame, "view_to_clip", inputs.camera.view_to_clip, 16);
     json_floats(frame, "jitter", inputs.camera.jitter, 2);
