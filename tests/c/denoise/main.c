@@ -85,7 +85,7 @@ static void upload_frame(const Sequence *sequence, VkCommandBuffer commands, uin
     }
 }
 
-static LimpidInputs read_inputs(const Json *frame, uint32_t number) {
+static LimpidInputs read_inputs(const Json *frame) {
     LimpidInputs inputs;
     json_floats(frame, "world_to_view", inputs.camera.world_to_view, 16);
     json_floats(frame, "view_to_clip", inputs.camera.view_to_clip, 16);
@@ -146,7 +146,7 @@ int main(int count, char **arguments) {
     LimpidPrevious previous;
     uint32_t number = 0;
     for (const Json *entry = sequence.frames->first; entry != NULL; entry = entry->next, number++) {
-        const LimpidInputs frame = read_inputs(entry, number);
+        const LimpidInputs frame = read_inputs(entry);
         const char *problem =
             limpid_fill_constants(&settings, &frame, number > 0 ? &previous : NULL, denoiser_constants(denoiser));
         if (problem != NULL) {
