@@ -18,8 +18,6 @@ override ACCUMULATED: bool = false;
 
 // Distance between taps, in half axes of the footprint.
 const SPACING: f32 = 0.5;
-// Hit shares further apart belong to different things.
-const SHARE_TOLERANCE: f32 = 0.3;
 
 @compute @workgroup_size(8, 8)
 fn block_spread(@builtin(global_invocation_id) id: vec3<u32>) {

@@ -46,7 +46,6 @@ const SHARP_FROM: f32 = 0.7;
 const NOISE_FALLOFF: f32 = 0.1;
 // Taps of mirrors count as at most this many times as bright as the pixel.
 const GLINT_LIMIT: f32 = 8.0;
-const SHARE_TOLERANCE: f32 = 0.3;
 
 // What the blocks around a pixel agree on.
 struct Wide {

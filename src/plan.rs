@@ -117,6 +117,24 @@ enum GridTemplate {
 
 use Copy::{Current, Previous};
 
+/// Gives tiles without work their fallback value, in both pipelines.
+const FILL: PassTemplate = PassTemplate {
+    name: "fill",
+    kernel: "fill",
+    is_needed: always,
+    stage: Stage::Denoise,
+    grid: GridTemplate::List(1),
+    overrides: &["FALLBACK"],
+    bindings: &[
+        ("in_radiance", "radiance", Current),
+        ("in_environment", "environment", Current),
+        ("in_guide", "guide", Current),
+        ("in_tiles", "tiles", Current),
+        ("in_args", "args", Current),
+        ("out_output", OUTPUT, Current),
+    ],
+};
+
 /// The published pipeline. `signal` holds reprojected history this frame (`Current`); last frame's copy is
 /// read for the history length and then holds the prefiltered radiance. `output` is history until it is
 /// written.
@@ -194,22 +212,7 @@ const PASSES: &[PassTemplate] = &[
             ("out_prefiltered", "signal", Previous),
         ],
     },
-    PassTemplate {
-        name: "fill",
-        kernel: "fill",
-        is_needed: always,
-        stage: Stage::Denoise,
-        grid: GridTemplate::List(1),
-        overrides: &["FALLBACK"],
-        bindings: &[
-            ("in_radiance", "radiance", Current),
-            ("in_environment", "environment", Current),
-            ("in_guide", "guide", Current),
-            ("in_tiles", "tiles", Current),
-            ("in_args", "args", Current),
-            ("out_output", OUTPUT, Current),
-        ],
-    },
+    FILL,
     PassTemplate {
         name: "resolve_temporal",
         kernel: "resolve_temporal",
@@ -316,22 +319,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         overrides: &["ACCUMULATED"],
         bindings: &[("in_blocks", BLOCKS, Current), ("out_blocks", BLOCKS, Current)],
     },
-    PassTemplate {
-        name: "fill",
-        kernel: "fill",
-        is_needed: always,
-        stage: Stage::Denoise,
-        grid: GridTemplate::List(1),
-        overrides: &["FALLBACK"],
-        bindings: &[
-            ("in_radiance", "radiance", Current),
-            ("in_environment", "environment", Current),
-            ("in_guide", "guide", Current),
-            ("in_tiles", "tiles", Current),
-            ("in_args", "args", Current),
-            ("out_output", OUTPUT, Current),
-        ],
-    },
+    FILL,
     PassTemplate {
         name: "lobe_filter",
         kernel: "lobe_filter",

@@ -11,6 +11,9 @@ const NORMAL_TOLERANCE: f32 = 0.04;
 const ROUGHNESS_SHARE: f32 = 0.35;
 const ROUGHNESS_FLOOR: f32 = 0.02;
 
+// Hit shares further apart belong to different things.
+const SHARE_TOLERANCE: f32 = 0.3;
+
 // Half axes in pixels, and the direction of the longer one.
 struct Footprint {
     axis: vec2<f32>,
