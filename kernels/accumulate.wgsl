@@ -46,7 +46,7 @@ override OUTLIER_SPREAD: bool = true;
 @group(1) @binding(4) var in_samples: texture_2d<u32>;
 @group(1) @binding(5) var in_light: texture_2d<u32>;
 @group(1) @binding(6) var<storage, read> in_tiles: array<u32>;
-@group(1) @binding(7) var<storage, read> in_args: array<vec4<u32>, 3>;
+@group(1) @binding(7) var<storage, read> in_args: array<vec4<u32>, 4>;
 @group(1) @binding(8) var out_history: texture_storage_2d<rg32uint, write>;
 
 // Share of the blocks around a pixel that has to show its surface.

@@ -14,7 +14,7 @@ import package::shared::fallback;
 
 @group(1) @binding(0) var in_guide: texture_2d<u32>;
 @group(1) @binding(1) var<storage, read> in_tiles: array<u32>;
-@group(1) @binding(2) var<storage, read> in_args: array<vec4<u32>, 3>;
+@group(1) @binding(2) var<storage, read> in_args: array<vec4<u32>, 4>;
 @group(1) @binding(3) var out_output: texture_storage_2d<rgba16float, write>;
 
 @compute @workgroup_size(8, 8)

@@ -30,7 +30,7 @@ override WIDE_FILTER: bool = true;
 @group(1) @binding(2) var in_history: texture_2d<u32>;
 @group(1) @binding(3) var in_blocks: texture_2d<u32>;
 @group(1) @binding(4) var<storage, read> in_tiles: array<u32>;
-@group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 3>;
+@group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 4>;
 @group(1) @binding(6) var out_output: texture_storage_2d<rgba16float, write>;
 
 // Near taps reach from so many pixels, for mirrors, to so many.

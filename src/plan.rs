@@ -30,8 +30,6 @@ pub enum Grid {
     One,
     /// One for each 8x8 tile of the frame's size.
     Tiles,
-    /// One for each 8x8 blocks of 4x4 pixels.
-    BlockTiles,
     /// Three `u32` in a buffer, written on the GPU.
     Indirect {
         /// Name of the buffer.
@@ -110,7 +108,6 @@ struct PassTemplate {
 enum GridTemplate {
     One,
     Tiles,
-    BlockTiles,
     /// A list of `args`.
     List(u64),
 }
@@ -151,6 +148,8 @@ const PASSES: &[PassTemplate] = &[
             "ROUGHNESS_IS_ALPHA",
             "ROUGHNESS_IS_CONSTANT",
             "AVERAGE_IS_USED",
+            "BLOCKS_ARE_USED",
+            "LIGHT_CHANGE",
             "RAYS_PER_QUAD",
             "RAYS_FOLLOW_VARIANCE",
         ],
@@ -164,6 +163,9 @@ const PASSES: &[PassTemplate] = &[
             ("out_tiles", "tiles", Current),
             ("out_rays", "rays", Current),
             ("out_counters", "counters", Current),
+            ("out_blocks", BLOCKS, Current),
+            ("out_other_blocks", OTHER_BLOCKS, Current),
+            ("out_light", "light", Current),
         ],
     },
     PassTemplate {
@@ -242,11 +244,13 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "block_average",
         is_needed: always,
         stage: Stage::Denoise,
-        grid: GridTemplate::BlockTiles,
+        grid: GridTemplate::List(3),
         overrides: &["OUTLIER_SPREAD", "SAMPLES_ARE_USED"],
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_guide", "guide", Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
             ("out_blocks", BLOCKS, Current),
             ("out_samples", "samples", Current),
         ],
@@ -256,13 +260,15 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "block_statistics",
         is_needed: always,
         stage: Stage::Denoise,
-        grid: GridTemplate::BlockTiles,
+        grid: GridTemplate::List(3),
         overrides: &["LIGHT_CHANGE", "SURFACE_MOTION"],
         bindings: &[
             ("in_motion", "motion", Current),
             ("in_blocks", BLOCKS, Current),
             ("in_samples", "samples", Current),
             ("in_prev_light", "light", Previous),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
             ("out_blocks", BLOCKS, Current),
             ("out_light", "light", Current),
         ],
@@ -272,9 +278,14 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "block_spread",
         is_needed: |settings| settings.features.outlier_spread,
         stage: Stage::Denoise,
-        grid: GridTemplate::BlockTiles,
+        grid: GridTemplate::List(3),
         overrides: &[],
-        bindings: &[("in_blocks", BLOCKS, Current), ("out_blocks", BLOCKS, Current)],
+        bindings: &[
+            ("in_blocks", BLOCKS, Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
+            ("out_blocks", BLOCKS, Current),
+        ],
     },
     PassTemplate {
         name: "accumulate",
@@ -302,11 +313,13 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "block_average",
         is_needed: has_wide_filter,
         stage: Stage::Denoise,
-        grid: GridTemplate::BlockTiles,
+        grid: GridTemplate::List(3),
         overrides: &["ACCUMULATED"],
         bindings: &[
             ("in_guide", "guide", Current),
             ("in_history", "history", Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
             ("out_blocks", BLOCKS, Current),
         ],
     },
@@ -315,9 +328,14 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "block_spread",
         is_needed: has_wide_filter,
         stage: Stage::Denoise,
-        grid: GridTemplate::BlockTiles,
+        grid: GridTemplate::List(3),
         overrides: &["ACCUMULATED"],
-        bindings: &[("in_blocks", BLOCKS, Current), ("out_blocks", BLOCKS, Current)],
+        bindings: &[
+            ("in_blocks", BLOCKS, Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
+            ("out_blocks", BLOCKS, Current),
+        ],
     },
     FILL,
     PassTemplate {
@@ -380,7 +398,7 @@ fn all_resources() -> Vec<Resource> {
         resource("tiles", buffer(4, Count::Per(Extent::Tile), false), Lifetime::Transient, false),
         resource("rays", buffer(4, Count::Per(Extent::Full), false), Lifetime::Transient, false),
         resource("counters", buffer(4, Count::Fixed(4), false), Lifetime::Persistent, false),
-        resource("args", buffer(16, Count::Fixed(3), true), Lifetime::Transient, false),
+        resource("args", buffer(16, Count::Fixed(4), true), Lifetime::Transient, false),
     ]
 }
 
@@ -414,6 +432,7 @@ fn override_value(settings: &Settings, name: &str) -> f64 {
         "RAYS_FOLLOW_VARIANCE" => f64::from(ray_list.is_some_and(|list| list.variance_threshold.is_some())),
         "ROUGHNESS_IS_CONSTANT" => f64::from(features.constant_roughness.is_some()),
         "AVERAGE_IS_USED" => f64::from(settings.pipeline == Pipeline::Published && features.uses_average()),
+        "BLOCKS_ARE_USED" => f64::from(settings.pipeline == Pipeline::Footprint),
         // The template that names it means it.
         "ACCUMULATED" => 1.0,
         "LIGHT_CHANGE" => f64::from(features.light_change),
@@ -448,6 +467,10 @@ struct Turns {
 impl Turns {
     fn take(&mut self, bindings: &mut [Bound]) {
         let last = self.other;
+        // A pass that writes both clears them.
+        if bindings.iter().any(|bound| bound.resource == OTHER_BLOCKS) {
+            return;
+        }
         for bound in bindings.iter_mut().filter(|bound| bound.resource == BLOCKS) {
             let writes = bound.access.writes();
             if writes != last {
@@ -487,7 +510,6 @@ fn plan_pass(template: &PassTemplate, settings: &Settings, sources: &Sources) ->
     let grid = match template.grid {
         GridTemplate::One => Grid::One,
         GridTemplate::Tiles => Grid::Tiles,
-        GridTemplate::BlockTiles => Grid::BlockTiles,
         GridTemplate::List(index) => Grid::Indirect { resource: "args".to_owned(), offset: index * ARGS_STRIDE },
     };
     let (name, kernel_name) = (template.name.to_owned(), template.kernel.to_owned());
@@ -566,7 +588,6 @@ impl fmt::Display for Plan {
             let grid = match &pass.grid {
                 Grid::One => "one workgroup".to_owned(),
                 Grid::Tiles => "a workgroup per tile".to_owned(),
-                Grid::BlockTiles => "a workgroup per 8x8 blocks".to_owned(),
                 Grid::Indirect { resource, offset } => format!("indirect from {resource} + {offset}"),
             };
             writeln!(f, "{} ({:?}), {grid}", pass.name, pass.stage)?;

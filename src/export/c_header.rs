@@ -199,7 +199,6 @@ impl Export<'_> {
             text += &format!("static const LimpidBinding {table}[{}] = {{\n{bindings}}};\n\n", pass.bindings.len());
             let (grid, resource, offset) = match &pass.grid {
                 Grid::One => ("ONE", "-1".to_owned(), 0),
-                Grid::BlockTiles => ("BLOCK_TILES", "-1".to_owned(), 0),
                 Grid::Tiles => ("TILES", "-1".to_owned(), 0),
                 Grid::Indirect { resource, offset } => {
                     ("INDIRECT", format!("LIMPID_RESOURCE_{}", upper(resource)), *offset)

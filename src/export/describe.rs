@@ -139,7 +139,6 @@ impl Export<'_> {
             workgroup_size: kernel.workgroup_size,
             grid: match &pass.grid {
                 Grid::One => GridEntry::Direct { x: "1", y: "1", z: "1" },
-                Grid::BlockTiles => GridEntry::Direct { x: "(width + 31) / 32", y: "(height + 31) / 32", z: "1" },
                 Grid::Tiles => GridEntry::Direct { x: "(width + 7) / 8", y: "(height + 7) / 8", z: "1" },
                 Grid::Indirect { resource, offset } => {
                     GridEntry::Indirect { resource: resource.clone(), offset: *offset }
