@@ -2,7 +2,7 @@
 //!
 //! in   guide      rg32uint      full    packed G-buffer
 //! in   radiance   any float     full    noisy input; a: hit distance (not when ACCUMULATED)
-//! in   history    rg32uint      full    this frame's accumulated radiance (when ACCUMULATED)
+//! in   history    rgba16float   full    this frame's accumulated radiance (when ACCUMULATED)
 //! in   tiles, args   lists             tiles to denoise
 //! out  blocks     rgba32uint    block   surface, mean radiance, hit share; what was cut off from outliers
 //! out  samples    rg32uint      block   largest luminances, moments of brightness (not when ACCUMULATED)
@@ -29,7 +29,7 @@ override OUTLIER_SPREAD: bool = true;
 override SAMPLES_ARE_USED: bool = false;
 
 @group(1) @binding(0) var in_guide: texture_2d<u32>;
-@group(1) @binding(1) var in_history: texture_2d<u32>;
+@group(1) @binding(1) var in_history: texture_2d<f32>;
 @group(1) @binding(2) var out_blocks: texture_storage_2d<rgba32uint, write>;
 @group(1) @binding(3) var out_samples: texture_storage_2d<rg32uint, write>;
 @group(1) @binding(4) var<storage, read> in_tiles: array<u32>;
@@ -109,7 +109,7 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
         let w = select(0.0, exp(-plane_penalty(plane, guide, vec2<f32>(pixel) + 0.5)), guide.denoised);
         var c = vec3<f32>(0.0);
         if ACCUMULATED {
-            let history = unpack_history(textureLoad(in_history, pixel, 0).xy);
+            let history = unpack_history(textureLoad(in_history, pixel, 0));
             c = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
             share += select(vec2<f32>(0.0), vec2<f32>(history.share, 1.0) * w, guide.denoised);
             noise += select(vec2<f32>(0.0), vec2<f32>(history.noise, 1.0) * w, guide.denoised && history.noise >= 0.0);

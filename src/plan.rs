@@ -84,15 +84,31 @@ pub struct Plan {
     pub passes: Vec<Pass>,
 }
 
-/// Name of the texture that holds the denoised radiance.
-pub const OUTPUT: &str = "output";
+/// The denoised image, in templates: see [`resource_of`].
+const OUTPUT: &str = "output";
+/// Last frame's, before this frame writes anything.
+const LAST_OUTPUT: &str = "last output";
+
+/// Where a pipeline keeps what templates call by a name.
+fn resource_of(pipeline: Pipeline, name: &'static str, copy: Copy) -> (&'static str, Copy) {
+    match (pipeline, name) {
+        (Pipeline::Published, LAST_OUTPUT) => (OUTPUT, Current),
+        // Once a frame's history has been read the denoised image takes its place.
+        (Pipeline::Footprint, OUTPUT) => ("history", Previous),
+        (Pipeline::Footprint, LAST_OUTPUT) => ("history", Current),
+        _ => (name, copy),
+    }
+}
 
 /// Averages over blocks of pixels, of which there are two.
 const BLOCKS: &str = "blocks";
 const OTHER_BLOCKS: &str = "other_blocks";
 
-/// What the caller reads: the denoised image, and the ray list with its length.
-const EXPORTED: &[&str] = &[OUTPUT, "rays", "args"];
+/// Variable of the denoised image in the kernels that write it.
+const OUTPUT_VARIABLE: &str = "out_output";
+
+/// What the caller reads besides the denoised image: the ray list with its length.
+const EXPORTED: &[&str] = &["rays", "args"];
 
 /// A pass before it is known which of its bindings the specialised kernel keeps.
 struct PassTemplate {
@@ -121,13 +137,14 @@ const FILL: PassTemplate = PassTemplate {
     is_needed: always,
     stage: Stage::Denoise,
     grid: GridTemplate::List(1),
-    overrides: &["FALLBACK"],
+    overrides: &["FALLBACK", "PREV_GUIDE_IS_KEPT"],
     bindings: &[
         ("in_radiance", "radiance", Current),
         ("in_environment", "environment", Current),
         ("in_guide", "guide", Current),
         ("in_tiles", "tiles", Current),
         ("in_args", "args", Current),
+        ("out_prev_guide", "prev_guide", Current),
         ("out_output", OUTPUT, Current),
     ],
 };
@@ -157,7 +174,7 @@ const PASSES: &[PassTemplate] = &[
             ("in_normal", "normal", Current),
             ("in_roughness", "roughness", Current),
             ("in_depth", "depth", Current),
-            ("in_history", OUTPUT, Current),
+            ("in_history", LAST_OUTPUT, Current),
             ("out_guide", "guide", Current),
             ("out_average", "average", Current),
             ("out_tiles", "tiles", Current),
@@ -298,7 +315,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
             ("in_guide", "guide", Current),
-            ("in_prev_guide", "guide", Previous),
+            ("in_prev_guide", "prev_guide", Current),
             ("in_history", "history", Previous),
             ("in_blocks", BLOCKS, Current),
             ("in_samples", "samples", Current),
@@ -353,6 +370,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             ("in_blocks", BLOCKS, Current),
             ("in_tiles", "tiles", Current),
             ("in_args", "args", Current),
+            ("out_prev_guide", "prev_guide", Current),
             ("out_output", OUTPUT, Current),
         ],
     },
@@ -373,7 +391,7 @@ fn all_resources() -> Vec<Resource> {
         kind,
         lifetime,
         ping_pong,
-        exported: EXPORTED.contains(&name),
+        exported: false,
     };
     let texture = |format, extent| Kind::Texture { format, extent };
     let buffer = |stride, count, indirect| Kind::Buffer { stride, count, indirect };
@@ -387,10 +405,11 @@ fn all_resources() -> Vec<Resource> {
         input("motion"),
         input("environment"),
         resource("guide", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
+        resource("prev_guide", texture(Format::R32Uint, Extent::Full), Lifetime::Persistent, false),
         resource("signal", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
         resource(OUTPUT, texture(Format::Rgba16Float, Extent::Full), Lifetime::Persistent, false),
         resource("average", texture(Format::Rgba16Float, Extent::Tile), Lifetime::Transient, false),
-        resource("history", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
+        resource("history", texture(Format::Rgba16Float, Extent::Full), Lifetime::Persistent, true),
         resource(BLOCKS, texture(Format::Rgba32Uint, Extent::Block), Lifetime::Transient, false),
         resource(OTHER_BLOCKS, texture(Format::Rgba32Uint, Extent::Block), Lifetime::Transient, false),
         resource("samples", texture(Format::Rg32Uint, Extent::Block), Lifetime::Transient, false),
@@ -432,7 +451,7 @@ fn override_value(settings: &Settings, name: &str) -> f64 {
         "RAYS_FOLLOW_VARIANCE" => f64::from(ray_list.is_some_and(|list| list.variance_threshold.is_some())),
         "ROUGHNESS_IS_CONSTANT" => f64::from(features.constant_roughness.is_some()),
         "AVERAGE_IS_USED" => f64::from(settings.pipeline == Pipeline::Published && features.uses_average()),
-        "BLOCKS_ARE_USED" => f64::from(settings.pipeline == Pipeline::Footprint),
+        "PREV_GUIDE_IS_KEPT" | "BLOCKS_ARE_USED" => f64::from(settings.pipeline == Pipeline::Footprint),
         // The template that names it means it.
         "ACCUMULATED" => 1.0,
         "LIGHT_CHANGE" => f64::from(features.light_change),
@@ -491,7 +510,7 @@ fn plan_pass(template: &PassTemplate, settings: &Settings, sources: &Sources) ->
             .bindings
             .iter()
             .find(|(variable, ..)| *variable == binding.name)
-            .map(|&(_, resource, copy)| (resource, copy))
+            .map(|&(_, resource, copy)| resource_of(settings.pipeline, resource, copy))
             .or((binding.name == "frame").then_some(("frame", Current)))
             .ok_or_else(|| Error::Kernel {
                 kernel: template.kernel,
@@ -557,7 +576,28 @@ impl Plan {
             })
         };
         let resources = all_resources().into_iter().filter(|resource| is_used(&resource.name)).collect();
-        Ok((Self { size, resources, passes }, kernels))
+        let mut plan = Self { size, resources, passes };
+        plan.settle_lives();
+        Ok((plan, kernels))
+    }
+
+    /// Keeps no pair of which nobody uses last frame's copy, and notes what the caller reads.
+    fn settle_lives(&mut self) {
+        let output = self.output().map(|(resource, _)| resource.to_owned());
+        let bindings = self.passes.iter().flat_map(|pass| &pass.bindings);
+        for resource in &mut self.resources {
+            if resource.ping_pong && !bindings.clone().any(|b| b.resource == resource.name && b.copy == Previous) {
+                (resource.ping_pong, resource.lifetime) = (false, Lifetime::Transient);
+            }
+            resource.exported = EXPORTED.contains(&resource.name.as_str()) || Some(&resource.name) == output.as_ref();
+        }
+    }
+
+    /// The denoised image when a frame has run: resource and copy. `None` for a plan without one.
+    pub fn output(&self) -> Option<(&str, Copy)> {
+        let mut bindings = self.passes.iter().flat_map(|pass| &pass.bindings);
+        let bound = bindings.find(|bound| bound.variable == OUTPUT_VARIABLE)?;
+        Some((&bound.resource, bound.copy))
     }
 
     /// The resource of that name.

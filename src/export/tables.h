@@ -28,7 +28,7 @@ typedef struct LimpidBinding {
 typedef struct LimpidPass {
     const char *name;    /* of file and entry point */
     int stage;           /* before or after the renderer traces rays */
-    int grid;            /* LIMPID_GRID_: one workgroup, one a tile, one for 8x8 blocks, or indirect */
+    int grid;            /* LIMPID_GRID_: one workgroup, one a tile, or indirect */
     int grid_resource;   /* buffer with the grid */
     uint32_t grid_offset;
     int barrier;         /* 1: needs a barrier on all memory before it */
