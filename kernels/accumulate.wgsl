@@ -118,7 +118,7 @@ fn nothing_found() -> Found {
 }
 
 fn mix_found(a: Found, b: Found, t: f32) -> Found {
-    return Found(mix(a.radiance, b.radiance, t), mix(a.length, b.length, t), mix(a.share, b.share, t), true);
+    return Found(blend(a.radiance, b.radiance, t), mix(a.length, b.length, t), mix(a.share, b.share, t), true);
 }
 
 // How far a tap may be from the surface it is history of.
@@ -269,7 +269,7 @@ fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
     let rate = 1.0 / (found.length + 1.0);
     let residual = brightness(radiance) - brightness(found.radiance);
     var history: History;
-    history.radiance = mix(found.radiance, radiance, rate) * frame.inverse_exposure;
+    history.radiance = blend(found.radiance, radiance, rate) * frame.inverse_exposure;
     history.length = found.length + 1.0;
     history.share = select(share, mix(found.share, share, max(rate, 0.1)), found.length > 0.0);
     // The residual has the variance of the sample and of the history; what is left of both after mixing.

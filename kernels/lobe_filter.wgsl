@@ -115,7 +115,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
         let tap = unpack_guide(textureLoad(in_guide, texel, 0).xy);
         let history = unpack_history(textureLoad(in_history, texel, 0));
         let radiance = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
-        let kept = radiance * mix(1.0, min(1.0, glint / luminance(radiance)), sharp);
+        let kept = blend(radiance, radiance * min(1.0, glint / luminance(radiance)), sharp);
         let rho = vec2<f32>(dot(offset, footprint.axis), dot(offset, side)) * falloff;
         let apart = (history.share - own.share) * (1.0 / SHARE_TOLERANCE);
         let brighter = brightness(radiance) - own_brightness;
@@ -127,7 +127,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     }
     let near = sum.rgb / sum.a;
     let by_blocks = smoothstep(WIDE_FROM, WIDE_TO, radius.x) * smoothstep(0.0, 0.3, wide.fit);
-    return vec4<f32>(mix(near, wide.radiance, by_blocks), wide.variance);
+    return vec4<f32>(blend(near, wide.radiance, by_blocks), wide.variance);
 }
 
 @compute @workgroup_size(8, 8)
