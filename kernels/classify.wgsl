@@ -1,15 +1,12 @@
-//! Classify: decodes the G-buffer once for all later passes, lists the 8x8 tiles that need denoising and,
-//! if asked to, the pixels for which the renderer has to trace a ray.
+//! Classify: decodes the G-buffer once for all later passes, finds the 8x8 tiles that need denoising and, if asked to,
+//! lists the pixels for which the renderer has to trace a ray.
 //!
 //! in   normal, roughness, depth   as the caller has them     full
 //! in   history      rgba16float   full   a: last frame's variance (ray list only)
 //! out  guide        rg32uint      full   packed normal, linear depth, roughness, left-out flag
-//! out  average      rgba16float   tile   0 in tiles that are left out
-//! out  blocks, other_blocks       rgba32uint    block   the same
-//! out  light        r32uint       block  the same
-//! out  tiles        u32 list      listed tiles from the front, left-out tiles from the back
+//! out  tile_flags   r32uint       tile   whether a pixel of the tile is denoised
 //! out  rays         u32 list      pixels to trace and where to copy the result (ray list only)
-//! out  counters     4 x u32       listed tiles, left-out tiles, rays
+//! out  counters     4 x u32       rays (ray list only)
 //!
 //! Grid: one invocation per pixel, 8x8. Reads and writes its own pixel: about 20 bytes in, 8 out.
 //! After: tile classification of the AMD FidelityFX denoiser 1.2 (2021). Differs: one ray per quad goes to the
@@ -18,7 +15,6 @@
 import package::shared::frame;
 import package::shared::packing;
 import package::shared::tiles;
-import package::shared::blocks;
 
 // 0: xyz in -1..1, 1: xyz in 0..1, 2: octahedral in -1..1, 3: octahedral in 0..1.
 override NORMAL_ENCODING: u32 = 0u;
@@ -28,12 +24,6 @@ override ROUGHNESS_CHANNEL: u32 = 0u;
 override ROUGHNESS_IS_ALPHA: bool = false;
 // All surfaces have the roughness in the constants; there is no texture of it.
 override ROUGHNESS_IS_CONSTANT: bool = false;
-// Some later pass uses the 8x8 averages.
-override AVERAGE_IS_USED: bool = true;
-// Later passes work on blocks, and leave those of tiles alone that are left out.
-override BLOCKS_ARE_USED: bool = false;
-// Later passes notice where the light changed.
-override LIGHT_CHANGE: bool = false;
 // Rays in a 2x2 quad: 1, 2 or 4; 0: no ray list.
 override RAYS_PER_QUAD: u32 = 0u;
 // Pixels whose variance was high last frame get their own ray.
@@ -45,13 +35,9 @@ override RAYS_FOLLOW_VARIANCE: bool = false;
 
 @group(1) @binding(0) var in_history: texture_2d<f32>;
 @group(1) @binding(1) var out_guide: texture_storage_2d<rg32uint, write>;
-@group(1) @binding(2) var out_average: texture_storage_2d<rgba16float, write>;
-@group(1) @binding(3) var<storage, read_write> out_tiles: array<u32>;
-@group(1) @binding(4) var<storage, read_write> out_rays: array<u32>;
-@group(1) @binding(5) var<storage, read_write> out_counters: array<atomic<u32>, 4>;
-@group(1) @binding(6) var out_blocks: texture_storage_2d<rgba32uint, write>;
-@group(1) @binding(7) var out_other_blocks: texture_storage_2d<rgba32uint, write>;
-@group(1) @binding(8) var out_light: texture_storage_2d<r32uint, write>;
+@group(1) @binding(2) var out_tile_flags: texture_storage_2d<r32uint, write>;
+@group(1) @binding(3) var<storage, read_write> out_rays: array<u32>;
+@group(1) @binding(4) var<storage, read_write> out_counters: array<atomic<u32>, 4>;
 
 const PIXEL_DENOISED: u32 = 1u;
 const PIXEL_PREFERS_RAY: u32 = 2u;
@@ -59,7 +45,7 @@ const PIXEL_PREFERS_RAY: u32 = 2u;
 var<workgroup> tile_is_listed: atomic<u32>;
 var<workgroup> tile_ray_count: atomic<u32>;
 var<workgroup> tile_first_ray: u32;
-var<workgroup> tile_flags: array<u32, 64>;
+var<workgroup> pixel_flags: array<u32, 64>;
 
 fn decode_normal(texel: vec4<f32>) -> vec3<f32> {
     if NORMAL_ENCODING == 0u {
@@ -129,25 +115,25 @@ fn representative(lane: u32) -> u32 {
     let quad = row & ~8u;
     if RAYS_PER_QUAD == 2u {
         let named = row + ((lane >> 3u) & 1u);
-        return select(named ^ 1u, named, (tile_flags[named] & PIXEL_DENOISED) != 0u);
+        return select(named ^ 1u, named, (pixel_flags[named] & PIXEL_DENOISED) != 0u);
     }
-    if (tile_flags[quad] & PIXEL_DENOISED) != 0u {
+    if (pixel_flags[quad] & PIXEL_DENOISED) != 0u {
         return quad;
     }
-    if (tile_flags[quad + 1u] & PIXEL_DENOISED) != 0u {
+    if (pixel_flags[quad + 1u] & PIXEL_DENOISED) != 0u {
         return quad + 1u;
     }
-    return select(quad + 9u, quad + 8u, (tile_flags[quad + 8u] & PIXEL_DENOISED) != 0u);
+    return select(quad + 9u, quad + 8u, (pixel_flags[quad + 8u] & PIXEL_DENOISED) != 0u);
 }
 
 fn is_traced(lane: u32) -> bool {
-    let flags = tile_flags[lane];
+    let flags = pixel_flags[lane];
     return (flags & PIXEL_DENOISED) != 0u && ((flags & PIXEL_PREFERS_RAY) != 0u || representative(lane) == lane);
 }
 
 // 1 when the pixel at `lane` is to receive the ray of `source`.
 fn copies_from(lane: u32, source: u32) -> u32 {
-    let denoised = (tile_flags[lane] & PIXEL_DENOISED) != 0u;
+    let denoised = (pixel_flags[lane] & PIXEL_DENOISED) != 0u;
     return select(0u, 1u, denoised && !is_traced(lane) && representative(lane) == source);
 }
 
@@ -174,31 +160,12 @@ fn classify(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_i
         }
     }
     if RAYS_PER_QUAD != 0u {
-        tile_flags[lane] = flags;
+        pixel_flags[lane] = flags;
     }
     workgroupBarrier();
 
     if lane == 0u {
-        if atomicLoad(&tile_is_listed) != 0u {
-            out_tiles[atomicAdd(&out_counters[0], 1u)] = pack_tile(tile);
-        } else {
-            let counts = tile_counts();
-            out_tiles[counts.x * counts.y - 1u - atomicAdd(&out_counters[1], 1u)] = pack_tile(tile);
-            if AVERAGE_IS_USED {
-                textureStore(out_average, tile, vec4<f32>(0.0));
-            }
-        }
-    }
-
-    if BLOCKS_ARE_USED {
-        let block = block_of_tile(tile, lane);
-        if lane < 4u && atomicLoad(&tile_is_listed) == 0u && all(vec2<i32>(block) <= last_block()) {
-            textureStore(out_blocks, block, vec4<u32>(0u));
-            textureStore(out_other_blocks, block, vec4<u32>(0u));
-            if LIGHT_CHANGE {
-                textureStore(out_light, block, vec4<u32>(0u));
-            }
-        }
+        textureStore(out_tile_flags, tile, vec4<u32>(atomicLoad(&tile_is_listed), 0u, 0u, 0u));
     }
 
     if RAYS_PER_QUAD != 0u {

@@ -20,6 +20,7 @@ macro_rules! sources {
 
 const SOURCES: &[(&str, &str)] = sources![
     "classify",
+    "list_tiles",
     "indirect_args",
     "fill",
     "reproject",

@@ -30,6 +30,8 @@ pub enum Grid {
     One,
     /// One for each 8x8 tile of the frame's size.
     Tiles,
+    /// One for each 8x8 tiles.
+    TileGroups,
     /// Three `u32` in a buffer, written on the GPU.
     Indirect {
         /// Name of the buffer.
@@ -124,6 +126,7 @@ struct PassTemplate {
 enum GridTemplate {
     One,
     Tiles,
+    TileGroups,
     /// A list of `args`.
     List(u64),
 }
@@ -164,9 +167,6 @@ const PASSES: &[PassTemplate] = &[
             "ROUGHNESS_CHANNEL",
             "ROUGHNESS_IS_ALPHA",
             "ROUGHNESS_IS_CONSTANT",
-            "AVERAGE_IS_USED",
-            "BLOCKS_ARE_USED",
-            "LIGHT_CHANGE",
             "RAYS_PER_QUAD",
             "RAYS_FOLLOW_VARIANCE",
         ],
@@ -176,10 +176,23 @@ const PASSES: &[PassTemplate] = &[
             ("in_depth", "depth", Current),
             ("in_history", LAST_OUTPUT, Current),
             ("out_guide", "guide", Current),
-            ("out_average", "average", Current),
-            ("out_tiles", "tiles", Current),
+            ("out_tile_flags", "tile_flags", Current),
             ("out_rays", "rays", Current),
             ("out_counters", "counters", Current),
+        ],
+    },
+    PassTemplate {
+        name: "list_tiles",
+        kernel: "list_tiles",
+        is_needed: always,
+        stage: Stage::Classify,
+        grid: GridTemplate::TileGroups,
+        overrides: &["AVERAGE_IS_USED", "BLOCKS_ARE_USED", "LIGHT_CHANGE"],
+        bindings: &[
+            ("in_tile_flags", "tile_flags", Current),
+            ("out_tiles", "tiles", Current),
+            ("inout_counters", "counters", Current),
+            ("out_average", "average", Current),
             ("out_blocks", BLOCKS, Current),
             ("out_other_blocks", OTHER_BLOCKS, Current),
             ("out_light", "light", Current),
@@ -253,7 +266,7 @@ const PASSES: &[PassTemplate] = &[
     },
 ];
 
-/// Accumulates first, filters over the lobe's footprint after. Follows the first two of `PASSES`. Passes over blocks
+/// Accumulates first, filters over the lobe's footprint after. Follows the first three of `PASSES`. Passes over blocks
 /// read the `blocks` that the last such pass wrote and write the other ones.
 const FOOTPRINT_PASSES: &[PassTemplate] = &[
     PassTemplate {
@@ -414,6 +427,7 @@ fn all_resources() -> Vec<Resource> {
         resource(OTHER_BLOCKS, texture(Format::Rgba32Uint, Extent::Block), Lifetime::Transient, false),
         resource("samples", texture(Format::Rg32Uint, Extent::Block), Lifetime::Transient, false),
         resource("light", texture(Format::R32Uint, Extent::Block), Lifetime::Persistent, true),
+        resource("tile_flags", texture(Format::R32Uint, Extent::Tile), Lifetime::Transient, false),
         resource("tiles", buffer(4, Count::Per(Extent::Tile), false), Lifetime::Transient, false),
         resource("rays", buffer(4, Count::Per(Extent::Full), false), Lifetime::Transient, false),
         resource("counters", buffer(4, Count::Fixed(4), false), Lifetime::Persistent, false),
@@ -529,6 +543,7 @@ fn plan_pass(template: &PassTemplate, settings: &Settings, sources: &Sources) ->
     let grid = match template.grid {
         GridTemplate::One => Grid::One,
         GridTemplate::Tiles => Grid::Tiles,
+        GridTemplate::TileGroups => Grid::TileGroups,
         GridTemplate::List(index) => Grid::Indirect { resource: "args".to_owned(), offset: index * ARGS_STRIDE },
     };
     let (name, kernel_name) = (template.name.to_owned(), template.kernel.to_owned());
@@ -560,7 +575,7 @@ impl Plan {
         let mut kernels = Vec::new();
         let templates: Vec<&PassTemplate> = match settings.pipeline {
             Pipeline::Published => PASSES.iter().collect(),
-            Pipeline::Footprint => PASSES[..2].iter().chain(FOOTPRINT_PASSES).collect(),
+            Pipeline::Footprint => PASSES[..3].iter().chain(FOOTPRINT_PASSES).collect(),
         };
         let mut turns = Turns::default();
         for template in templates.into_iter().filter(|template| (template.is_needed)(settings)) {
@@ -628,6 +643,7 @@ impl fmt::Display for Plan {
             let grid = match &pass.grid {
                 Grid::One => "one workgroup".to_owned(),
                 Grid::Tiles => "a workgroup per tile".to_owned(),
+                Grid::TileGroups => "a workgroup per 8x8 tiles".to_owned(),
                 Grid::Indirect { resource, offset } => format!("indirect from {resource} + {offset}"),
             };
             writeln!(f, "{} ({:?}), {grid}", pass.name, pass.stage)?;

@@ -211,6 +211,7 @@ impl Export<'_> {
             let (grid, resource, offset) = match &pass.grid {
                 Grid::One => ("ONE", "-1".to_owned(), 0),
                 Grid::Tiles => ("TILES", "-1".to_owned(), 0),
+                Grid::TileGroups => ("TILE_GROUPS", "-1".to_owned(), 0),
                 Grid::Indirect { resource, offset } => {
                     ("INDIRECT", format!("LIMPID_RESOURCE_{}", upper(resource)), *offset)
                 }

@@ -146,6 +146,7 @@ impl Export<'_> {
             grid: match &pass.grid {
                 Grid::One => GridEntry::Direct { x: "1", y: "1", z: "1" },
                 Grid::Tiles => GridEntry::Direct { x: "(width + 7) / 8", y: "(height + 7) / 8", z: "1" },
+                Grid::TileGroups => GridEntry::Direct { x: "(width + 63) / 64", y: "(height + 63) / 64", z: "1" },
                 Grid::Indirect { resource, offset } => {
                     GridEntry::Indirect { resource: resource.clone(), offset: *offset }
                 }

@@ -19,7 +19,8 @@ int main(void) {
         return 3;
     }
     limpid_extent(&limpid_resources[LIMPID_RESOURCE_BLOCKS], 1921, 1080, extent);
-    if (extent[0] != 481 || extent[1] != 270 || limpid_passes[LIMPID_PASS_BLOCK_AVERAGE].grid != LIMPID_GRID_INDIRECT) {
+    limpid_grid(&limpid_passes[LIMPID_PASS_LIST_TILES], 1921, 1080, grid);
+    if (extent[0] != 481 || extent[1] != 270 || grid[0] != 31 || grid[1] != 17 || grid[2] != 1) {
         return 4;
     }
     while (fread(&record, sizeof record, 1, stdin) == 1) {
