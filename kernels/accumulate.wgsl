@@ -56,6 +56,10 @@ const FIT: f32 = 0.2;
 const SURFACE_FROM: f32 = 0.05;
 const SURFACE_TO: f32 = 0.4;
 const REFLECTION_UP_TO: f32 = 0.6;
+// Weight of a mirror's own sample among the 3x3 that bound its history, and roughness from which it has none extra:
+// lamps in mirrors have edges, and the deviation across an edge bounds nothing.
+const MIRROR_WEIGHT: f32 = 20.0;
+const MIRROR_UP_TO: f32 = 0.03;
 
 // What the blocks around a pixel say about its surface.
 struct Surroundings {
@@ -180,17 +184,19 @@ fn misfit(history: vec3<f32>, around: Surroundings) -> f32 {
 }
 
 // Moves history towards the mean of the 3x3 pixels where it is beyond their deviation.
-fn clipped(history: vec3<f32>, pixel: vec2<u32>) -> vec3<f32> {
-    var sum = vec3<f32>(0.0);
-    var squares = vec3<f32>(0.0);
+fn clipped(history: vec3<f32>, own: vec3<f32>, pixel: vec2<u32>, roughness: f32) -> vec3<f32> {
+    let weight = MIRROR_WEIGHT * (1.0 - smoothstep(0.0, MIRROR_UP_TO, roughness));
+    var sum = squeezed(own) * weight;
+    var squares = sum * squeezed(own);
     for (var i = 0; i < 9; i++) {
         let at = clamp(vec2<i32>(pixel) + vec2<i32>(i % 3, i / 3) - 1, vec2<i32>(0), vec2<i32>(frame.size) - 1);
         let c = squeezed(load_radiance(vec2<u32>(at)));
         sum += c;
         squares += c * c;
     }
-    let mean = sum * (1.0 / 9.0);
-    let variance = max(squares * (1.0 / 9.0) - mean * mean, vec3<f32>(0.0));
+    let normalization = 1.0 / (9.0 + weight);
+    let mean = sum * normalization;
+    let variance = max(squares * normalization - mean * mean, vec3<f32>(0.0));
     let extent = sqrt(variance) * frame.accumulate_clip_scale + 0.02;
     let c = clamp(squeezed(history), max(mean - extent, vec3<f32>(0.0)), min(mean + extent, vec3<f32>(0.9999)));
     return c / (1.0 - c);
@@ -264,7 +270,8 @@ fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
         found.length *= 1.0 - changed * smoothstep(0.05, 0.2, guide.roughness);
     }
     if HISTORY_CLIP {
-        found.radiance = select(found.radiance, clipped(found.radiance, pixel), guide.roughness < frame.accumulate_clip_roughness);
+        let bounded = clipped(found.radiance, radiance, pixel, guide.roughness);
+        found.radiance = select(found.radiance, bounded, guide.roughness < frame.accumulate_clip_roughness);
     }
     let rate = 1.0 / (found.length + 1.0);
     let residual = brightness(radiance) - brightness(found.radiance);
