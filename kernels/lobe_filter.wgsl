@@ -17,6 +17,7 @@ import package::shared::packing;
 import package::shared::radiance;
 import package::shared::tiles;
 import package::shared::footprint;
+import package::shared::outliers;
 import package::shared::history;
 import package::shared::blocks;
 import package::shared::fallback;
@@ -103,7 +104,8 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let falloff = 1.0 / max(radius, vec2<f32>(NEAR_LEAST));
     var direction = vec2<f32>(1.0, 0.0);
     // a: weight.
-    var sum = vec4<f32>(own_radiance, 1.0) * trust(own.length);
+    var sum = vec4<f32>(0.0);
+    var brightest = 0.0;
     for (var i = 0u; i < NEAR_TAPS; i++) {
         let point = direction * (reach * sqrt(f32(i) + 0.5));
         direction = turned(direction);
@@ -113,7 +115,8 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
         let tap = unpack_guide(textureLoad(in_guide, texel, 0).xy);
         let history = unpack_history(textureLoad(in_history, texel, 0).xy);
         let radiance = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
-        let kept = radiance * mix(1.0, min(1.0, glint / luminance(radiance)), sharp);
+        let l = luminance(radiance);
+        let kept = radiance * mix(1.0, min(1.0, glint / l), sharp);
         let rho = vec2<f32>(dot(offset, footprint.axis), dot(offset, side)) * falloff;
         let apart = (history.share - own.share) * (1.0 / SHARE_TOLERANCE);
         let brighter = brightness(radiance) - own_brightness;
@@ -122,7 +125,12 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
         let counts = tap.denoised && all(at == texel) && any(at != vec2<i32>(pixel));
         let w = select(0.0, trust(history.length) * exp(-penalty), counts);
         sum += vec4<f32>(select(vec3<f32>(0.0), kept, counts), 1.0) * w;
+        brightest = max(brightest, select(0.0, l, counts));
     }
+    // What stands out alone has to last: above the brightest tap it counts as so many times as bright as frames saw it.
+    let limit = min(1.0, own.length * brightest / luminance(own_radiance));
+    let alone = select(1.0, limit, brightest > 0.0 && guide.roughness >= OUTLIER_ROUGHNESS);
+    sum += vec4<f32>(own_radiance * alone, 1.0) * trust(own.length);
     let near = sum.rgb / sum.a;
     let by_blocks = smoothstep(WIDE_FROM, WIDE_TO, radius.x) * smoothstep(0.0, 0.3, wide.fit);
     return vec4<f32>(mix(near, wide.radiance, by_blocks), wide.variance);
