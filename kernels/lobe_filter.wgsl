@@ -40,6 +40,8 @@ const NEAR_MOST: f32 = 3.0;
 // Half axis of the filter, in pixels, from and to which blocks take over.
 const WIDE_FROM: f32 = 1.0;
 const WIDE_TO: f32 = 3.0;
+// Blocks whose hit share differs by this show other things: contact shadows of a light that is far away end sharply.
+const WIDE_SHARE: f32 = 0.15;
 // Half axis below which, and from which no longer, taps may differ by noise alone.
 const SHARP_TO: f32 = 0.3;
 const SHARP_FROM: f32 = 0.7;
@@ -57,13 +59,15 @@ struct Wide {
     variance: f32,
 }
 
-fn blocks_around(pixel: vec2<u32>, plane: Plane) -> Wide {
+fn blocks_around(pixel: vec2<u32>, plane: Plane, own_share: f32) -> Wide {
     var sum: Wide;
     for (var i = 0u; i < 4u; i++) {
         let corner = corner_of(pixel, i);
         let tap = unpack_block(textureLoad(in_blocks, corner.block, 0));
         let share = select(0.0, corner.weight, tap.guide.denoised);
-        let w = select(0.0, corner.weight * exp(-plane_penalty(plane, tap.guide, block_place(corner.block))), tap.guide.denoised);
+        let apart = (tap.share - own_share) * (1.0 / WIDE_SHARE);
+        let penalty = plane_penalty(plane, tap.guide, block_place(corner.block)) + apart * apart;
+        let w = select(0.0, corner.weight * exp(-penalty), tap.guide.denoised);
         sum.radiance += w * tap.radiance;
         sum.fit += w;
         sum.variance += share * tap.deviation * tap.deviation;
@@ -93,7 +97,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let side = side_of(footprint.axis);
     var wide: Wide;
     if WIDE_FILTER {
-        wide = blocks_around(pixel, plane);
+        wide = blocks_around(pixel, plane, own.share);
     }
 
     let sharp = 1.0 - smoothstep(SHARP_TO, SHARP_FROM, radius.x);
