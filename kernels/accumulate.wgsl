@@ -56,6 +56,13 @@ const FIT: f32 = 0.2;
 const SURFACE_FROM: f32 = 0.05;
 const SURFACE_TO: f32 = 0.4;
 const REFLECTION_UP_TO: f32 = 0.6;
+// A sample so many times as bright as its surroundings has hit what few rays hit: that its hit distance is another
+// than history's is no reason to forget history.
+const RARE: f32 = 2.0;
+// Weight of a mirror's own sample among the 3x3 that bound its history, and roughness from which it has none extra:
+// lamps in mirrors have edges, and the deviation across an edge bounds nothing.
+const MIRROR_WEIGHT: f32 = 20.0;
+const MIRROR_UP_TO: f32 = 0.03;
 
 // What the blocks around a pixel say about its surface.
 struct Surroundings {
@@ -127,6 +134,8 @@ struct Tolerance {
     plane: f32,
     // Least cosine between normals.
     cosine: f32,
+    // Difference of hit share.
+    share: f32,
 }
 
 // Blends those of four texels that show the surface. The plane test is done in world space, so that a camera that
@@ -153,7 +162,7 @@ fn history_at(prev_uv: vec2<f32>, guide: Guide, position: vec3<f32>, share: f32,
             && abs(from_plane) < tolerance.plane * guide.depth
             && dot(tap.normal, guide.normal) > tolerance.cosine
             && abs(tap.roughness - guide.roughness) <= 0.5 * guide.roughness + 0.15
-            && abs(history.share - share) < 0.08 + 4.0 * guide.roughness
+            && abs(history.share - share) < tolerance.share
             && history.length > 0.0;
         let bilinear = select(1.0 - fraction, fraction, offset == vec2<u32>(1u));
         let w = select(0.0, bilinear.x * bilinear.y, is_same);
@@ -180,17 +189,19 @@ fn misfit(history: vec3<f32>, around: Surroundings) -> f32 {
 }
 
 // Moves history towards the mean of the 3x3 pixels where it is beyond their deviation.
-fn clipped(history: vec3<f32>, pixel: vec2<u32>) -> vec3<f32> {
-    var sum = vec3<f32>(0.0);
-    var squares = vec3<f32>(0.0);
+fn clipped(history: vec3<f32>, own: vec3<f32>, pixel: vec2<u32>, roughness: f32) -> vec3<f32> {
+    let weight = MIRROR_WEIGHT * (1.0 - smoothstep(0.0, MIRROR_UP_TO, roughness));
+    var sum = squeezed(own) * weight;
+    var squares = sum * squeezed(own);
     for (var i = 0; i < 9; i++) {
         let at = clamp(vec2<i32>(pixel) + vec2<i32>(i % 3, i / 3) - 1, vec2<i32>(0), vec2<i32>(frame.size) - 1);
         let c = squeezed(load_radiance(vec2<u32>(at)));
         sum += c;
         squares += c * c;
     }
-    let mean = sum * (1.0 / 9.0);
-    let variance = max(squares * (1.0 / 9.0) - mean * mean, vec3<f32>(0.0));
+    let normalization = 1.0 / (9.0 + weight);
+    let mean = sum * normalization;
+    let variance = max(squares * normalization - mean * mean, vec3<f32>(0.0));
     let extent = sqrt(variance) * frame.accumulate_clip_scale + 0.02;
     let c = clamp(squeezed(history), max(mean - extent, vec3<f32>(0.0)), min(mean + extent, vec3<f32>(0.9999)));
     return c / (1.0 - c);
@@ -205,10 +216,11 @@ fn surface_prev_uv(pixel: vec2<u32>) -> vec2<f32> {
 }
 
 // History by both motions, its length bounded by what it is worth.
-fn find_history(pixel: vec2<u32>, guide: Guide, position: vec3<f32>, share: f32, around: Surroundings) -> Found {
+fn find_history(pixel: vec2<u32>, guide: Guide, position: vec3<f32>, share: f32, is_rare: bool, around: Surroundings) -> Found {
     let r = guide.roughness;
     let size = vec2<f32>(frame.size);
     let static_uv = prev_uv_of(position);
+    let share_tolerance = select(0.08 + 4.0 * r, 1.0, is_rare);
     var cap = mix(frame.accumulate_mirror_history, frame.accumulate_max_history, smoothstep(0.0, frame.accumulate_clip_roughness, r));
     var surface_uv = static_uv;
     var surface = nothing_found();
@@ -217,7 +229,7 @@ fn find_history(pixel: vec2<u32>, guide: Guide, position: vec3<f32>, share: f32,
     if SURFACE_MOTION {
         surface_uv = surface_prev_uv(pixel);
         moves = length((surface_uv - static_uv) * size) > 0.5;
-        let tolerance = Tolerance(select(0.01, 0.1, moves), select(0.9, 0.7, moves));
+        let tolerance = Tolerance(select(0.01, 0.1, moves), select(0.9, 0.7, moves), share_tolerance);
         surface = history_at(surface_uv, guide, position, share, tolerance);
     }
     var found = surface;
@@ -227,7 +239,7 @@ fn find_history(pixel: vec2<u32>, guide: Guide, position: vec3<f32>, share: f32,
         let dominant = (1.0 - alpha) * (sqrt(1.0 - alpha) + alpha);
         let distance = hit_distance_of(share, camera_distance_of(position)) * dominant;
         let reflection_uv = prev_uv_of(position + view_direction(position) * distance) + (surface_uv - static_uv);
-        let tolerance = Tolerance(select(0.015, 0.1, moves), select(0.98, 0.95, r >= 0.3));
+        let tolerance = Tolerance(select(0.015, 0.1, moves), select(0.98, 0.95, r >= 0.3), share_tolerance);
         let reflection = history_at(reflection_uv, guide, position, share, tolerance);
         let apart = max(length((reflection_uv - surface_uv) * size), 1e-3);
         let radius = lobe_footprint(position, guide, share).along;
@@ -258,13 +270,15 @@ fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
     // Single hit distances of rough surfaces say little, and go with the colour of their sample.
     let share = mix(own_share, around.share, smoothstep(0.03, 0.2, guide.roughness) * around.fit);
 
-    var found = find_history(pixel, guide, position, share, around);
+    let is_rare = guide.roughness >= OUTLIER_ROUGHNESS && luminance(radiance) > RARE * luminance(around.mean);
+    var found = find_history(pixel, guide, position, share, is_rare, around);
     if LIGHT_CHANGE {
         let changed = unpack2x16float(textureLoad(in_light, pixel / BLOCK_SIZE, 0).x).y;
         found.length *= 1.0 - changed * smoothstep(0.05, 0.2, guide.roughness);
     }
     if HISTORY_CLIP {
-        found.radiance = select(found.radiance, clipped(found.radiance, pixel), guide.roughness < frame.accumulate_clip_roughness);
+        let bounded = clipped(found.radiance, radiance, pixel, guide.roughness);
+        found.radiance = select(found.radiance, bounded, guide.roughness < frame.accumulate_clip_roughness);
     }
     let rate = 1.0 / (found.length + 1.0);
     let residual = brightness(radiance) - brightness(found.radiance);

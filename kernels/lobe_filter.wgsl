@@ -18,6 +18,7 @@ import package::shared::packing;
 import package::shared::radiance;
 import package::shared::tiles;
 import package::shared::footprint;
+import package::shared::outliers;
 import package::shared::history;
 import package::shared::blocks;
 import package::shared::fallback;
@@ -41,6 +42,8 @@ const NEAR_MOST: f32 = 3.0;
 // Half axis of the filter, in pixels, from and to which blocks take over.
 const WIDE_FROM: f32 = 1.0;
 const WIDE_TO: f32 = 3.0;
+// Blocks whose hit share differs by this show other things: contact shadows of a light that is far away end sharply.
+const WIDE_SHARE: f32 = 0.15;
 // Half axis below which, and from which no longer, taps may differ by noise alone.
 const SHARP_TO: f32 = 0.3;
 const SHARP_FROM: f32 = 0.7;
@@ -58,13 +61,15 @@ struct Wide {
     variance: f32,
 }
 
-fn blocks_around(pixel: vec2<u32>, plane: Plane) -> Wide {
+fn blocks_around(pixel: vec2<u32>, plane: Plane, own_share: f32) -> Wide {
     var sum: Wide;
     for (var i = 0u; i < 4u; i++) {
         let corner = corner_of(pixel, i);
         let tap = unpack_block(textureLoad(in_blocks, corner.block, 0));
         let share = select(0.0, corner.weight, tap.guide.denoised);
-        let w = select(0.0, corner.weight * exp(-plane_penalty(plane, tap.guide, block_place(corner.block))), tap.guide.denoised);
+        let apart = (tap.share - own_share) * (1.0 / WIDE_SHARE);
+        let penalty = plane_penalty(plane, tap.guide, block_place(corner.block)) + apart * apart;
+        let w = select(0.0, corner.weight * exp(-penalty), tap.guide.denoised);
         sum.radiance += w * tap.radiance;
         sum.fit += w;
         sum.variance += share * tap.deviation * tap.deviation;
@@ -94,7 +99,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let side = side_of(footprint.axis);
     var wide: Wide;
     if WIDE_FILTER {
-        wide = blocks_around(pixel, plane);
+        wide = blocks_around(pixel, plane, own.share);
     }
 
     let sharp = 1.0 - smoothstep(SHARP_TO, SHARP_FROM, radius.x);
@@ -105,7 +110,8 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let falloff = 1.0 / max(radius, vec2<f32>(NEAR_LEAST));
     var direction = vec2<f32>(1.0, 0.0);
     // a: weight.
-    var sum = vec4<f32>(own_radiance, 1.0) * trust(own.length);
+    var sum = vec4<f32>(0.0);
+    var brightest = 0.0;
     for (var i = 0u; i < NEAR_TAPS; i++) {
         let point = direction * (reach * sqrt(f32(i) + 0.5));
         direction = turned(direction);
@@ -115,7 +121,8 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
         let tap = unpack_guide(textureLoad(in_guide, texel, 0).xy);
         let history = unpack_history(textureLoad(in_history, texel, 0));
         let radiance = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
-        let kept = blend(radiance, radiance * min(1.0, glint / luminance(radiance)), sharp);
+        let l = luminance(radiance);
+        let kept = blend(radiance, radiance * min(1.0, glint / l), sharp);
         let rho = vec2<f32>(dot(offset, footprint.axis), dot(offset, side)) * falloff;
         let apart = (history.share - own.share) * (1.0 / SHARE_TOLERANCE);
         let brighter = brightness(radiance) - own_brightness;
@@ -124,7 +131,12 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
         let counts = tap.denoised && all(at == texel) && any(at != vec2<i32>(pixel));
         let w = select(0.0, trust(history.length) * exp(-penalty), counts);
         sum += vec4<f32>(select(vec3<f32>(0.0), kept, counts), 1.0) * w;
+        brightest = max(brightest, select(0.0, l, counts));
     }
+    // What stands out alone has to last: above the brightest tap it counts as so many times as bright as frames saw it.
+    let limit = min(1.0, own.length * brightest / luminance(own_radiance));
+    let alone = select(1.0, limit, brightest > 0.0 && guide.roughness >= OUTLIER_ROUGHNESS);
+    sum += vec4<f32>(own_radiance * alone, 1.0) * trust(own.length);
     let near = sum.rgb / sum.a;
     let by_blocks = smoothstep(WIDE_FROM, WIDE_TO, radius.x) * smoothstep(0.0, 0.3, wide.fit);
     return vec4<f32>(blend(near, wide.radiance, by_blocks), wide.variance);
