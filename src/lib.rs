@@ -56,6 +56,7 @@
 #![forbid(unsafe_code)]
 
 mod dead_code;
+mod debug_view;
 mod denoiser;
 pub mod emit;
 mod error;
@@ -69,6 +70,7 @@ pub mod resource;
 pub mod settings;
 pub mod synchronization;
 
+pub use debug_view::{DebugView, Key, Legend};
 pub use denoiser::{Denoiser, FrameSchedule};
 pub use error::Error;
 pub use frame::{Camera, FrameConstants, FrameInputs};
