@@ -3,7 +3,7 @@ use std::sync::Arc;
 use ash::vk;
 use glam::UVec2;
 use limpid::kernel::Binding;
-use limpid::plan::{Grid, OUTPUT, Stage};
+use limpid::plan::{DEBUG_VIEW, Grid, OUTPUT, Stage};
 use limpid::resource::Copy;
 use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
@@ -431,6 +431,13 @@ impl Denoiser {
     /// [`resize`](Self::resize) or a change of settings that makes everything anew.
     pub fn output(&self) -> OwnImage {
         self.intermediate_image(OUTPUT, Copy::Current).expect("every plan has an output")
+    }
+
+    /// The debug view, `R16G16B16A16_SFLOAT` in the layout `GENERAL`: linear colours, 0 to 1, as
+    /// [`limpid::DebugView::legend`] explains them. Visible to [`Options::reader_stages`] from the end of the recorded
+    /// frame until the next frame's commands, which wait for those stages. `None` unless the settings ask for one.
+    pub fn debug_view(&self) -> Option<OwnImage> {
+        self.intermediate_image(DEBUG_VIEW, Copy::Current)
     }
 
     /// The rays to trace, after [`record_classify`](Self::record_classify), visible to [`Options::reader_stages`].

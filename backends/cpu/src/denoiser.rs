@@ -2,7 +2,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::UVec2;
 use limpid::kernel::Kernel;
-use limpid::plan::{Bound, Grid, OUTPUT, Pass, Stage};
+use limpid::plan::{Bound, DEBUG_VIEW, Grid, OUTPUT, Pass, Stage};
 use limpid::resource::{Copy, Format, Kind};
 use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
@@ -303,6 +303,12 @@ impl Denoiser {
     /// The denoised image of the last frame: `rgb` radiance, `a` variance. Also next frame's history.
     pub fn output(&self) -> &Texture {
         self.intermediate_texture(OUTPUT, Copy::Current).expect("every plan has an output")
+    }
+
+    /// The debug view of the last frame: linear colours, 0 to 1, as [`limpid::DebugView::legend`] explains them. `None`
+    /// unless the settings ask for one.
+    pub fn debug_view(&self) -> Option<&Texture> {
+        self.intermediate_texture(DEBUG_VIEW, Copy::Current)
     }
 
     /// A texture of the plan as it is after the last frame.
