@@ -13,13 +13,17 @@ const INK: Rgb<u8> = Rgb([230, 230, 230]);
 const GLYPH: u32 = 8;
 const MARGIN: u32 = 4;
 const LINE: u32 = 12;
-/// From one stop of a ramp to the next.
+/// Least width from one stop of a ramp to the next.
 const STOP: u32 = 56;
 /// Widths of pictures that each unit of a pixel more is for.
-const WIDTH_PER_UNIT: u32 = 600;
+const WIDTH_PER_UNIT: u32 = 1000;
 
 fn text_width(text: &str) -> u32 {
     text.chars().count() as u32 * GLYPH
+}
+
+fn stop_width(ramp: &[Key]) -> u32 {
+    ramp.iter().map(|key| text_width(key.label) + 2 * GLYPH).max().unwrap_or(0).max(STOP)
 }
 
 /// Where the keys go that follow each other and begin new lines where they do not fit: x, line, key.
@@ -62,13 +66,14 @@ impl Sheet {
     }
 
     fn ramp(&mut self, y: u32, ramp: &[Key]) {
+        let (stop, first) = (stop_width(ramp), MARGIN + stop_width(ramp) / 2);
         for (index, pair) in ramp.windows(2).enumerate() {
             let mixed = |t| std::array::from_fn(|i| pair[0].color[i] + (pair[1].color[i] - pair[0].color[i]) * t);
-            self.fill([MARGIN + STOP / 2 + index as u32 * STOP, y, STOP, GLYPH], |t| picture::srgb(mixed(t)));
+            self.fill([first + index as u32 * stop, y, stop, GLYPH], |t| picture::srgb(mixed(t)));
         }
         for (index, key) in ramp.iter().enumerate() {
-            let middle = MARGIN + STOP / 2 + index as u32 * STOP;
-            self.text(middle - (text_width(key.label) / 2).min(middle), y + GLYPH + 2, key.label);
+            let middle = first + index as u32 * stop;
+            self.text(middle - text_width(key.label) / 2, y + GLYPH + 2, key.label);
         }
     }
 }
@@ -78,7 +83,7 @@ pub(crate) fn with_legend(picture: &RgbImage, view: Option<DebugView>) -> RgbIma
     let Some(legend) = view.map(DebugView::legend) else { return picture.clone() };
     let unit = picture.width().div_ceil(WIDTH_PER_UNIT).max(1);
     let longest = legend.keys.iter().map(|key| LINE + text_width(key.label)).max().unwrap_or(0);
-    let ramp_width = legend.ramp.len() as u32 * STOP;
+    let ramp_width = legend.ramp.len() as u32 * stop_width(legend.ramp);
     let needed = 2 * MARGIN + longest.max(text_width(legend.title)).max(ramp_width);
     let width = (picture.width() / unit).max(needed);
     let keys = flow(legend.keys, width);

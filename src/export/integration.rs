@@ -4,10 +4,11 @@ use std::fmt::Write;
 
 use super::manifest::{BindingEntry, GridEntry, Manifest, PassEntry, ResourceEntry, ResourceKind};
 use super::{Export, MANIFEST, Target};
-use crate::plan::Stage;
+use crate::plan::{DEBUG_VIEW, Stage};
 use crate::resource::{Copy, Lifetime};
 use crate::settings::{DepthEncoding, NormalEncoding, RoughnessEncoding};
 use crate::synchronization::{Barrier, Scope};
+use crate::{DebugView, Key};
 
 /// What is said of a language's API.
 struct Words {
@@ -80,6 +81,7 @@ impl Export<'_> {
         );
         page += &self.steps(&manifest, &words);
         page += &resource_table(&manifest, target);
+        page += &self.debug_view_legend();
         page += "## Passes\n\n";
         let _ = write!(page, "{} {}\n\n", words.bind, words.barrier);
         manifest.passes.iter().for_each(|pass| page += &pass_section(pass, target, &words));
@@ -112,6 +114,22 @@ impl Export<'_> {
             inputs.join(", "),
             list(&mut stage(Stage::Denoise)),
         )
+    }
+
+    fn debug_view_legend(&self) -> String {
+        let Some(legend) = self.settings.features.debug_view.map(DebugView::legend) else { return String::new() };
+        let mut section = format!(
+            "## Debug view\n\n`debug_view` shows {}, in linear colours. Read it after `{DEBUG_VIEW}` and before the next frame.\n\n\
+             | red, green, blue | |\n|---|---|\n",
+            legend.title
+        );
+        for Key { color: [r, g, b], label } in legend.ramp.iter().chain(legend.keys) {
+            let _ = writeln!(section, "| {r}, {g}, {b} | {label} |");
+        }
+        if !legend.ramp.is_empty() {
+            let _ = writeln!(section, "\nThe first {} are mixed for what lies between.", legend.ramp.len());
+        }
+        section + "\n"
     }
 
     fn chosen_conventions(&self) -> String {

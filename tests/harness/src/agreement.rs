@@ -102,7 +102,8 @@ impl Table {
             let others = &b.0[name];
             assert_eq!(words.len(), others.len(), "{name}");
             let accumulated = Accumulated::ALL.iter().find(|accumulated| accumulated.resource == name);
-            let is_halves = accumulated.is_some() || matches!(name.as_str(), "previous signal" | "average" | "output");
+            let is_halves = accumulated.is_some()
+                || matches!(name.as_str(), "previous signal" | "average" | "output" | "debug_view");
             // Compared in the frame that wrote it.
             if name == "previous history" {
                 continue;
