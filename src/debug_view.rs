@@ -114,7 +114,7 @@ impl DebugView {
                 keys: const { &[key(MAGENTA, "no number"), GREY] },
             },
             Self::MotionError => Legend {
-                title: "motion off the camera's, pixels",
+                title: "motion against a static scene, pixels",
                 ramp: const { &ramp(["1/8", "1/2", "2", "8", "32"]) },
                 keys: const {
                     &[
@@ -149,9 +149,9 @@ impl DebugView {
                 },
             },
             Self::Candidate => Legend {
-                title: "history found by the motion of",
+                title: "history by the motion of",
                 ramp: const { &[key(GREEN, "surface"), key(BLUE, "reflection")] },
-                keys: const { &[key(YELLOW, "either, by search or at an edge"), key(RED, "none found"), GREY] },
+                keys: const { &[key(YELLOW, "by search or at an edge (preset reference)"), key(RED, "none found"), GREY] },
             },
         }
     }

@@ -119,7 +119,7 @@ impl Export<'_> {
     fn debug_view_legend(&self) -> String {
         let Some(legend) = self.settings.features.debug_view.map(DebugView::legend) else { return String::new() };
         let mut section = format!(
-            "## Debug view\n\n`debug_view` shows {}, in linear colours. Read it after `{DEBUG_VIEW}` and before the next frame.\n\n\
+            "## Debug view\n\nThe texture `{DEBUG_VIEW}` shows in linear colours: {}. Read it between the denoise passes of this frame and the next.\n\n\
              | red, green, blue | |\n|---|---|\n",
             legend.title
         );
