@@ -52,6 +52,9 @@
 //! large, pixels are hundreds of times too large) everything turns noisy while the camera moves,
 //! because history is rejected, and calms down as soon as it stops. Mirror-like flat surfaces hide all this:
 //! they follow the hit distance and the camera matrices instead; look at rough or curved ones.
+//!
+//! [`DebugView::MotionError`] shows all of this at a glance: it is black where motion vectors are what the camera's
+//! motion makes them. The other [`DebugView`]s show where history is lost, and why.
 
 #![forbid(unsafe_code)]
 
