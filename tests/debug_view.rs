@@ -7,8 +7,9 @@ use glam::{DMat4, DVec3, DVec4, Mat4, Quat, UVec2, Vec3};
 use limpid::plan::DEBUG_VIEW;
 use limpid::settings::Pipeline;
 use limpid::{Camera, DebugView, Error, Legend, Plan, Preset, Settings};
+use limpid_harness::executor::{Ash, AshOptions, Cpu};
 use limpid_harness::strategy::{any_spec, noise};
-use limpid_harness::{Case, Executor, Images, Pixel, Snapshot, Table, executors, fastest, runner};
+use limpid_harness::{Case, Executor, Images, Pixel, Snapshot, Table, executors, fastest, runner, skip};
 use proptest::prelude::*;
 
 const SIZE: UVec2 = UVec2::new(45, 29);
@@ -331,6 +332,29 @@ fn tiles_are_those_of_the_list() {
             seen.insert(expected);
         }
         assert_eq!(seen.len(), 4, "{seen:?}");
+    }
+}
+
+#[test]
+fn kernels_keep_the_rules_and_views_are_kept_where_memory_is_shared() {
+    let mut sharing = match Ash::try_open(&AshOptions { shared_memory: true, ..AshOptions::default() }) {
+        Ok(ash) => Some((ash, fastest())),
+        Err(error) => {
+            skip(&error.to_string());
+            None
+        }
+    };
+    let mut case = wall(0.02, 3);
+    case.steps[2].images = Images::new(SIZE, |p| Pixel { depth: (p.x % 20) as f32, ..Pixel::WALL });
+    for (pipeline, view) in all_views() {
+        let case = shown(&case, pipeline, view);
+        let mut watched = Cpu::watched();
+        case.run(&mut watched);
+        assert_eq!(watched.faults(), Vec::<String>::new(), "{pipeline:?} {view:?}");
+        if let Some((sharing, own)) = &mut sharing {
+            let view_of = |executor: &mut dyn Executor| case.run(executor).iter().map(colors).collect::<Vec<_>>();
+            assert_eq!(view_of(sharing), view_of(own.as_mut()), "{pipeline:?} {view:?}");
+        }
     }
 }
 
