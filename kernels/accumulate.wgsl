@@ -4,13 +4,13 @@
 //! in   radiance      any float    full    noisy input; a: hit distance
 //! in   motion        any float    full    uv motion of the surface (surface motion)
 //! in   guide         rg32uint     full    this frame's packed G-buffer
-//! in   prev_guide    rg32uint     full    last frame's
-//! in   history       rg32uint     full    last frame's `history`
+//! in   prev_guide    r32uint      full    last frame's, in fewer bits
+//! in   history       rgba16float  full    last frame's `history`
 //! in   blocks        rgba32uint   block   statistics of the input, excess of outliers spread over the footprint
 //! in   samples       rg32uint     block   largest luminances (outlier spread)
 //! in   light         r32uint      block   whether the light changed (light change)
 //! in   tiles, args   lists                tiles to denoise
-//! out  history       rg32uint     full    accumulated radiance, its length, noise and hit share
+//! out  history       rgba16float  full    accumulated radiance, its length, noise and hit share
 //!
 //! Grid: one 8x8 workgroup per listed tile (indirect). Loads 4 blocks, 8 guides, 8 histories, 9 radiances at most.
 //! After: accumulation as in Schied et al. 2017 (SVGF); reflected points after Lagarde and de Rousiers 2014 (dominant
@@ -41,13 +41,13 @@ override OUTLIER_SPREAD: bool = true;
 
 @group(1) @binding(0) var in_guide: texture_2d<u32>;
 @group(1) @binding(1) var in_prev_guide: texture_2d<u32>;
-@group(1) @binding(2) var in_history: texture_2d<u32>;
+@group(1) @binding(2) var in_history: texture_2d<f32>;
 @group(1) @binding(3) var in_blocks: texture_2d<u32>;
 @group(1) @binding(4) var in_samples: texture_2d<u32>;
 @group(1) @binding(5) var in_light: texture_2d<u32>;
 @group(1) @binding(6) var<storage, read> in_tiles: array<u32>;
-@group(1) @binding(7) var<storage, read> in_args: array<vec4<u32>, 3>;
-@group(1) @binding(8) var out_history: texture_storage_2d<rg32uint, write>;
+@group(1) @binding(7) var<storage, read> in_args: array<vec4<u32>, 4>;
+@group(1) @binding(8) var out_history: texture_storage_2d<rgba16float, write>;
 
 // Share of the blocks around a pixel that has to show its surface.
 const FIT: f32 = 0.2;
@@ -118,7 +118,7 @@ fn nothing_found() -> Found {
 }
 
 fn mix_found(a: Found, b: Found, t: f32) -> Found {
-    return Found(mix(a.radiance, b.radiance, t), mix(a.length, b.length, t), mix(a.share, b.share, t), true);
+    return Found(blend(a.radiance, b.radiance, t), mix(a.length, b.length, t), mix(a.share, b.share, t), true);
 }
 
 // How far a tap may be from the surface it is history of.
@@ -146,8 +146,8 @@ fn history_at(prev_uv: vec2<f32>, guide: Guide, position: vec3<f32>, share: f32,
     for (var i = 0u; i < 4u; i++) {
         let offset = vec2<u32>(i & 1u, i >> 1u);
         let texel = clamp(vec2<i32>(base) + vec2<i32>(offset), vec2<i32>(0), last);
-        let tap = unpack_guide(textureLoad(in_prev_guide, texel, 0).xy);
-        let history = unpack_history(textureLoad(in_history, texel, 0).xy);
+        let tap = unpack_prev_guide(textureLoad(in_prev_guide, texel, 0).x);
+        let history = unpack_history(textureLoad(in_history, texel, 0));
         let from_plane = dot(guide.normal, prev_world_position(texel, tap.depth) - position);
         let is_same = tap.denoised
             && abs(from_plane) < tolerance.plane * guide.depth
@@ -269,7 +269,7 @@ fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
     let rate = 1.0 / (found.length + 1.0);
     let residual = brightness(radiance) - brightness(found.radiance);
     var history: History;
-    history.radiance = mix(found.radiance, radiance, rate) * frame.inverse_exposure;
+    history.radiance = blend(found.radiance, radiance, rate) * frame.inverse_exposure;
     history.length = found.length + 1.0;
     history.share = select(share, mix(found.share, share, max(rate, 0.1)), found.length > 0.0);
     // The residual has the variance of the sample and of the history; what is left of both after mixing.
@@ -292,5 +292,5 @@ fn accumulate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
     if guide.denoised {
         history = accumulated(pixel, guide);
     }
-    textureStore(out_history, pixel, vec4<u32>(pack_history(history), 0u, 0u));
+    textureStore(out_history, pixel, pack_history(history));
 }

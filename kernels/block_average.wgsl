@@ -2,11 +2,13 @@
 //!
 //! in   guide      rg32uint      full    packed G-buffer
 //! in   radiance   any float     full    noisy input; a: hit distance (not when ACCUMULATED)
-//! in   history    rg32uint      full    this frame's accumulated radiance (when ACCUMULATED)
+//! in   history    rgba16float   full    this frame's accumulated radiance (when ACCUMULATED)
+//! in   tiles, args   lists             tiles to denoise
 //! out  blocks     rgba32uint    block   surface, mean radiance, hit share; what was cut off from outliers
 //! out  samples    rg32uint      block   largest luminances, moments of brightness (not when ACCUMULATED)
 //!
-//! Grid: one invocation a block, 8x8 of them a workgroup. Each pixel is read twice.
+//! Grid: one invocation a block, workgroups of the blocks of 16 listed tiles (indirect).
+//! Each pixel is read twice.
 //! After: outliers are set aside, not lost, as in DeCoro et al. 2010; here their excess is spread by `block_spread`
 //! and comes back in `accumulate`.
 
@@ -17,6 +19,7 @@ import package::shared::outliers;
 import package::shared::footprint;
 import package::shared::history;
 import package::shared::blocks;
+import package::shared::tiles;
 
 // Averages what was accumulated, not the input.
 override ACCUMULATED: bool = false;
@@ -26,9 +29,11 @@ override OUTLIER_SPREAD: bool = true;
 override SAMPLES_ARE_USED: bool = false;
 
 @group(1) @binding(0) var in_guide: texture_2d<u32>;
-@group(1) @binding(1) var in_history: texture_2d<u32>;
+@group(1) @binding(1) var in_history: texture_2d<f32>;
 @group(1) @binding(2) var out_blocks: texture_storage_2d<rgba32uint, write>;
 @group(1) @binding(3) var out_samples: texture_storage_2d<rg32uint, write>;
+@group(1) @binding(4) var<storage, read> in_tiles: array<u32>;
+@group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 4>;
 
 // What stands for a block.
 struct Choice {
@@ -71,19 +76,20 @@ fn choose(corner: vec2<u32>) -> Choice {
     return choice;
 }
 
-@compute @workgroup_size(8, 8)
-fn block_average(@builtin(global_invocation_id) id: vec3<u32>) {
-    if any(vec2<i32>(id.xy) > last_block()) {
+@compute @workgroup_size(64)
+fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let index = block_list_index(group, lane);
+    if index >= in_args[0].w {
         return;
     }
-    let corner = id.xy * BLOCK_SIZE;
+    let block_index = block_of_tile(unpack_tile(in_tiles[index]), lane);
+    if any(vec2<i32>(block_index) > last_block()) {
+        return;
+    }
+    let corner = block_index * BLOCK_SIZE;
     let choice = choose(corner);
     if !choice.guide.denoised {
-        textureStore(out_blocks, id.xy, vec4<u32>(0u));
-        // Neighbours give them no weight, but what is not a number would reach them even so.
-        if SAMPLES_ARE_USED {
-            textureStore(out_samples, id.xy, vec4<u32>(0u));
-        }
+        textureStore(out_blocks, block_index, vec4<u32>(0u));
         return;
     }
     let position = world_position(choice.pixel, choice.guide.depth);
@@ -103,7 +109,7 @@ fn block_average(@builtin(global_invocation_id) id: vec3<u32>) {
         let w = select(0.0, exp(-plane_penalty(plane, guide, vec2<f32>(pixel) + 0.5)), guide.denoised);
         var c = vec3<f32>(0.0);
         if ACCUMULATED {
-            let history = unpack_history(textureLoad(in_history, pixel, 0).xy);
+            let history = unpack_history(textureLoad(in_history, pixel, 0));
             c = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
             share += select(vec2<f32>(0.0), vec2<f32>(history.share, 1.0) * w, guide.denoised);
             noise += select(vec2<f32>(0.0), vec2<f32>(history.noise, 1.0) * w, guide.denoised && history.noise >= 0.0);
@@ -136,7 +142,7 @@ fn block_average(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     if SAMPLES_ARE_USED {
         let peaks = min(choice.peaks, vec2<f32>(HALF_MAX));
-        textureStore(out_samples, id.xy, vec4<u32>(pack2x16float(peaks), pack2x16float(moments), 0u, 0u));
+        textureStore(out_samples, block_index, vec4<u32>(pack2x16float(peaks), pack2x16float(moments), 0u, 0u));
     }
-    textureStore(out_blocks, id.xy, pack_block(block));
+    textureStore(out_blocks, block_index, pack_block(block));
 }

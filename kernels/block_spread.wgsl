@@ -1,28 +1,37 @@
 //! Block spread: filters blocks over the footprint of the lobe.
 //!
 //! in   blocks   rgba32uint   block   of the input, or of what was accumulated
+//! in   tiles, args   lists           tiles to denoise
 //! out  blocks   rgba32uint   block   with its excess, or its radiance, filtered
 //!
-//! Grid: one invocation a block, 8x8 of them a workgroup. 25 taps on a grid that stretches with the footprint.
+//! Grid: one invocation a block, workgroups of the blocks of 16 listed tiles (indirect).
+//! 25 taps on a grid that stretches with the footprint.
 
 import package::shared::frame;
 import package::shared::packing;
 import package::shared::footprint;
 import package::shared::blocks;
+import package::shared::tiles;
 
 // Filters the radiance that was accumulated, not the excess of the input.
 override ACCUMULATED: bool = false;
 
 @group(1) @binding(0) var in_blocks: texture_2d<u32>;
 @group(1) @binding(1) var out_blocks: texture_storage_2d<rgba32uint, write>;
+@group(1) @binding(2) var<storage, read> in_tiles: array<u32>;
+@group(1) @binding(3) var<storage, read> in_args: array<vec4<u32>, 4>;
 
 // Distance between taps, in half axes of the footprint.
 const SPACING: f32 = 0.5;
 
-@compute @workgroup_size(8, 8)
-fn block_spread(@builtin(global_invocation_id) id: vec3<u32>) {
+@compute @workgroup_size(64)
+fn block_spread(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let index = block_list_index(group, lane);
+    if index >= in_args[0].w {
+        return;
+    }
     let last = last_block();
-    let center = vec2<i32>(id.xy);
+    let center = vec2<i32>(block_of_tile(unpack_tile(in_tiles[index]), lane));
     if any(center > last) {
         return;
     }

@@ -4,10 +4,12 @@
 //! in   samples      rg32uint      block   moments of brightness
 //! in   motion       any float     full    uv motion of the surface (light change, surface motion)
 //! in   prev_light   r32uint       block   last frame's `light`
+//! in   tiles, args   lists                tiles to denoise
 //! out  blocks       rgba32uint    block   mean over 3x3 blocks, deviation between them
 //! out  light        r32uint       block   typical brightness of a sample over time, and whether it changed
 //!
-//! Grid: one invocation a block, 8x8 of them a workgroup. 9 taps.
+//! Grid: one invocation a block, workgroups of the blocks of 16 listed tiles (indirect).
+//! 9 taps.
 //! What is compared over time is the mean of squeezed brightness, not of radiance: single bright samples, which come
 //! and go, hardly move it, and what all samples agree on does.
 
@@ -16,6 +18,7 @@ import package::shared::packing;
 import package::shared::footprint;
 import package::shared::history;
 import package::shared::blocks;
+import package::shared::tiles;
 
 // Notices where the light changed.
 override LIGHT_CHANGE: bool = true;
@@ -29,6 +32,8 @@ override SURFACE_MOTION: bool = true;
 @group(1) @binding(2) var in_prev_light: texture_2d<u32>;
 @group(1) @binding(3) var out_blocks: texture_storage_2d<rgba32uint, write>;
 @group(1) @binding(4) var out_light: texture_storage_2d<r32uint, write>;
+@group(1) @binding(5) var<storage, read> in_tiles: array<u32>;
+@group(1) @binding(6) var<storage, read> in_args: array<vec4<u32>, 4>;
 
 // A change counts beyond this, standard errors and a share of the brightness.
 const LIGHT_FLOOR: f32 = 0.01;
@@ -57,10 +62,14 @@ fn luminance_to_keep(brightness: f32) -> f32 {
     return min(brightness / max(1.0 - brightness, 1e-5) * frame.inverse_exposure, HALF_MAX);
 }
 
-@compute @workgroup_size(8, 8)
-fn block_statistics(@builtin(global_invocation_id) id: vec3<u32>) {
+@compute @workgroup_size(64)
+fn block_statistics(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let index = block_list_index(group, lane);
+    if index >= in_args[0].w {
+        return;
+    }
     let last = last_block();
-    let center = vec2<i32>(id.xy);
+    let center = vec2<i32>(block_of_tile(unpack_tile(in_tiles[index]), lane));
     if any(center > last) {
         return;
     }
@@ -94,7 +103,9 @@ fn block_statistics(@builtin(global_invocation_id) id: vec3<u32>) {
         let b = brightness(tap.radiance);
         moments += vec2<f32>(b, b * b) * w;
         if LIGHT_CHANGE {
-            sample_moments += unpack2x16float(textureLoad(in_samples, at, 0).y) * w;
+            // Blocks that show no reflection have none.
+            let samples = unpack2x16float(textureLoad(in_samples, at, 0).y);
+            sample_moments += select(vec2<f32>(0.0), samples * w, tap.guide.denoised);
             squared_weight += w * w;
         }
     }

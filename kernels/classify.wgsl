@@ -5,6 +5,8 @@
 //! in   history      rgba16float   full   a: last frame's variance (ray list only)
 //! out  guide        rg32uint      full   packed normal, linear depth, roughness, left-out flag
 //! out  average      rgba16float   tile   0 in tiles that are left out
+//! out  blocks, other_blocks       rgba32uint    block   the same
+//! out  light        r32uint       block  the same
 //! out  tiles        u32 list      listed tiles from the front, left-out tiles from the back
 //! out  rays         u32 list      pixels to trace and where to copy the result (ray list only)
 //! out  counters     4 x u32       listed tiles, left-out tiles, rays
@@ -16,6 +18,7 @@
 import package::shared::frame;
 import package::shared::packing;
 import package::shared::tiles;
+import package::shared::blocks;
 
 // 0: xyz in -1..1, 1: xyz in 0..1, 2: octahedral in -1..1, 3: octahedral in 0..1.
 override NORMAL_ENCODING: u32 = 0u;
@@ -27,6 +30,10 @@ override ROUGHNESS_IS_ALPHA: bool = false;
 override ROUGHNESS_IS_CONSTANT: bool = false;
 // Some later pass uses the 8x8 averages.
 override AVERAGE_IS_USED: bool = true;
+// Later passes work on blocks, and leave those of tiles alone that are left out.
+override BLOCKS_ARE_USED: bool = false;
+// Later passes notice where the light changed.
+override LIGHT_CHANGE: bool = false;
 // Rays in a 2x2 quad: 1, 2 or 4; 0: no ray list.
 override RAYS_PER_QUAD: u32 = 0u;
 // Pixels whose variance was high last frame get their own ray.
@@ -42,6 +49,9 @@ override RAYS_FOLLOW_VARIANCE: bool = false;
 @group(1) @binding(3) var<storage, read_write> out_tiles: array<u32>;
 @group(1) @binding(4) var<storage, read_write> out_rays: array<u32>;
 @group(1) @binding(5) var<storage, read_write> out_counters: array<atomic<u32>, 4>;
+@group(1) @binding(6) var out_blocks: texture_storage_2d<rgba32uint, write>;
+@group(1) @binding(7) var out_other_blocks: texture_storage_2d<rgba32uint, write>;
+@group(1) @binding(8) var out_light: texture_storage_2d<r32uint, write>;
 
 const PIXEL_DENOISED: u32 = 1u;
 const PIXEL_PREFERS_RAY: u32 = 2u;
@@ -176,6 +186,17 @@ fn classify(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_i
             out_tiles[counts.x * counts.y - 1u - atomicAdd(&out_counters[1], 1u)] = pack_tile(tile);
             if AVERAGE_IS_USED {
                 textureStore(out_average, tile, vec4<f32>(0.0));
+            }
+        }
+    }
+
+    if BLOCKS_ARE_USED {
+        let block = block_of_tile(tile, lane);
+        if lane < 4u && atomicLoad(&tile_is_listed) == 0u && all(vec2<i32>(block) <= last_block()) {
+            textureStore(out_blocks, block, vec4<u32>(0u));
+            textureStore(out_other_blocks, block, vec4<u32>(0u));
+            if LIGHT_CHANGE {
+                textureStore(out_light, block, vec4<u32>(0u));
             }
         }
     }

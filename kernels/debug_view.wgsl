@@ -1,7 +1,7 @@
 //! Debug view: shows in colours what the footprint pipeline finds out about each pixel.
 //!
 //! in   guide          rg32uint      full    packed G-buffer
-//! in   accumulated    rg32uint      full    this frame's `history` (history length, variance)
+//! in   accumulated    rgba16float   full    this frame's `history` (history length, variance)
 //! in   radiance       any float     full    hit distance; all that `accumulate` reads (disocclusion, candidate)
 //! in   blocks         rgba32uint    block   as `accumulate` reads them (average)
 //! in   motion         any float     full    uv motion of the surface (motion error)
@@ -13,7 +13,7 @@
 import package::accumulate;
 import package::shared::debug_view;
 
-@group(1) @binding(9) var in_accumulated: texture_2d<u32>;
+@group(1) @binding(9) var in_accumulated: texture_2d<f32>;
 
 // The two histories that `find_history` chooses from.
 struct Candidates {
@@ -89,10 +89,10 @@ fn view_color(pixel: vec2<u32>, guide: Guide) -> vec3<f32> {
         return LEFT_OUT;
     }
     if VIEW == HISTORY_LENGTH {
-        return history_length_color(unpack_history(textureLoad(in_accumulated, pixel, 0).xy).length);
+        return history_length_color(unpack_history(textureLoad(in_accumulated, pixel, 0)).length);
     }
     if VIEW == VARIANCE {
-        return variance_color(unpack_history(textureLoad(in_accumulated, pixel, 0).xy).noise);
+        return variance_color(unpack_history(textureLoad(in_accumulated, pixel, 0)).noise);
     }
     if VIEW == HIT_DISTANCE {
         return hit_distance_color(textureLoad(in_radiance, pixel, 0).a, guide.depth);

@@ -3,6 +3,7 @@
 //! in   guide      rg32uint      full   environment fallback only
 //! in   radiance   any float     full   input fallback only
 //! out  output     rgba16float   full   rgb: fallback radiance; a: 0
+//! out  prev_guide r32uint       full   0 (footprint pipeline)
 //!
 //! Grid: one 8x8 workgroup per left-out tile (indirect). Touches its own pixel only.
 
@@ -12,10 +13,14 @@ import package::shared::radiance;
 import package::shared::tiles;
 import package::shared::fallback;
 
+// The G-buffer is kept for the next frame.
+override PREV_GUIDE_IS_KEPT: bool = false;
+
 @group(1) @binding(0) var in_guide: texture_2d<u32>;
 @group(1) @binding(1) var<storage, read> in_tiles: array<u32>;
-@group(1) @binding(2) var<storage, read> in_args: array<vec4<u32>, 3>;
+@group(1) @binding(2) var<storage, read> in_args: array<vec4<u32>, 4>;
 @group(1) @binding(3) var out_output: texture_storage_2d<rgba16float, write>;
+@group(1) @binding(4) var out_prev_guide: texture_storage_2d<r32uint, write>;
 
 @compute @workgroup_size(8, 8)
 fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -35,4 +40,7 @@ fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
     }
     textureStore(out_output, pixel, rounded_to_half(vec4<f32>(fallback_radiance(pixel, guide), 0.0)));
+    if PREV_GUIDE_IS_KEPT {
+        textureStore(out_prev_guide, pixel, vec4<u32>(0u));
+    }
 }

@@ -1,12 +1,13 @@
 //! Lobe filter: smooths accumulated radiance over the footprint of the specular lobe: the blocks around a pixel where
 //! the footprint is wide, a few pixels where it is narrow, and for mirrors those that differ by noise alone.
 //!
-//! in   history       rg32uint      full    this frame's accumulated radiance
+//! in   history       rgba16float   full    this frame's accumulated radiance
 //! in   guide         rg32uint      full    packed G-buffer
 //! in   blocks        rgba32uint    block   accumulated radiance filtered over the footprint, its deviation
 //! in   tiles, args   lists                 tiles to denoise
 //! in   radiance      any float     full    input fallback
 //! out  output        rgba16float   full    rgb: denoised radiance; a: variance of its brightness, 0..1
+//! out  prev_guide    r32uint       full    what the next frame wants to know of the G-buffer
 //!
 //! Grid: one 8x8 workgroup per listed tile (indirect). Loads 4 blocks, and a history and a guide for each near tap.
 //! Weights depend on the surface, on hit distance and on how settled a tap is; on colour for mirrors only: elsewhere
@@ -27,11 +28,12 @@ override NEAR_TAPS: u32 = 12u;
 override WIDE_FILTER: bool = true;
 
 @group(1) @binding(1) var in_guide: texture_2d<u32>;
-@group(1) @binding(2) var in_history: texture_2d<u32>;
+@group(1) @binding(2) var in_history: texture_2d<f32>;
 @group(1) @binding(3) var in_blocks: texture_2d<u32>;
 @group(1) @binding(4) var<storage, read> in_tiles: array<u32>;
-@group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 3>;
+@group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 4>;
 @group(1) @binding(6) var out_output: texture_storage_2d<rgba16float, write>;
+@group(1) @binding(7) var out_prev_guide: texture_storage_2d<r32uint, write>;
 
 // Near taps reach from so many pixels, for mirrors, to so many.
 const NEAR_LEAST: f32 = 1.5;
@@ -83,7 +85,7 @@ fn turned(direction: vec2<f32>) -> vec2<f32> {
 
 // rgb: filtered radiance, exposed; a: variance of the accumulated brightness.
 fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
-    let own = unpack_history(textureLoad(in_history, pixel, 0).xy);
+    let own = unpack_history(textureLoad(in_history, pixel, 0));
     let own_radiance = min(own.radiance * frame.exposure, vec3<f32>(HALF_MAX));
     let position = world_position(pixel, guide.depth);
     let plane = plane_of(guide, position);
@@ -111,9 +113,9 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
         let at = vec2<i32>(pixel) + vec2<i32>(offset);
         let texel = clamp(at, vec2<i32>(0), vec2<i32>(frame.size) - 1);
         let tap = unpack_guide(textureLoad(in_guide, texel, 0).xy);
-        let history = unpack_history(textureLoad(in_history, texel, 0).xy);
+        let history = unpack_history(textureLoad(in_history, texel, 0));
         let radiance = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
-        let kept = radiance * mix(1.0, min(1.0, glint / luminance(radiance)), sharp);
+        let kept = blend(radiance, radiance * min(1.0, glint / luminance(radiance)), sharp);
         let rho = vec2<f32>(dot(offset, footprint.axis), dot(offset, side)) * falloff;
         let apart = (history.share - own.share) * (1.0 / SHARE_TOLERANCE);
         let brighter = brightness(radiance) - own_brightness;
@@ -125,7 +127,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     }
     let near = sum.rgb / sum.a;
     let by_blocks = smoothstep(WIDE_FROM, WIDE_TO, radius.x) * smoothstep(0.0, 0.3, wide.fit);
-    return vec4<f32>(mix(near, wide.radiance, by_blocks), wide.variance);
+    return vec4<f32>(blend(near, wide.radiance, by_blocks), wide.variance);
 }
 
 @compute @workgroup_size(8, 8)
@@ -147,4 +149,5 @@ fn lobe_filter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
         result = vec4<f32>(fallback_radiance(pixel, guide), 0.0);
     }
     textureStore(out_output, pixel, rounded_to_half(result));
+    textureStore(out_prev_guide, pixel, vec4<u32>(pack_prev_guide(guide), 0u, 0u, 0u));
 }

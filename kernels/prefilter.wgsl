@@ -20,7 +20,7 @@ import package::shared::average;
 @group(1) @binding(1) var in_guide: texture_2d<u32>;
 @group(1) @binding(2) var in_reprojected: texture_2d<u32>;
 @group(1) @binding(3) var<storage, read> in_tiles: array<u32>;
-@group(1) @binding(4) var<storage, read> in_args: array<vec4<u32>, 3>;
+@group(1) @binding(4) var<storage, read> in_args: array<vec4<u32>, 4>;
 @group(1) @binding(5) var out_prefiltered: texture_storage_2d<rg32uint, write>;
 
 const WINDOW_SIZE: u32 = 14u;

@@ -40,7 +40,7 @@ override AVERAGE_IS_USED: bool = true;
 @group(1) @binding(2) var in_history: texture_2d<f32>;
 @group(1) @binding(3) var in_prev_signal: texture_2d<u32>;
 @group(1) @binding(4) var<storage, read> in_tiles: array<u32>;
-@group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 3>;
+@group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 4>;
 @group(1) @binding(6) var out_reprojected: texture_storage_2d<rg32uint, write>;
 @group(1) @binding(7) var out_average: texture_storage_2d<rgba16float, write>;
 

@@ -33,7 +33,7 @@ override AVERAGE_IS_READ: bool = true;
 @group(1) @binding(2) var in_reprojected: texture_2d<u32>;
 @group(1) @binding(3) var in_prefiltered: texture_2d<u32>;
 @group(1) @binding(4) var<storage, read> in_tiles: array<u32>;
-@group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 3>;
+@group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 4>;
 @group(1) @binding(6) var out_output: texture_storage_2d<rgba16float, write>;
 
 // The nearest colour to `center` on the way to `color` that lies in the box of half size `extent` around it.

@@ -5,7 +5,7 @@ use glam::UVec2;
 use crate::frame::{self, FrameConstants, FrameInputs, Previous};
 use crate::kernel::Kernel;
 use crate::plan::{Grid, Plan};
-use crate::resource::{Extent, TILE_SIZE};
+use crate::resource::Extent;
 use crate::settings::Settings;
 use crate::{Error, plan};
 
@@ -27,10 +27,6 @@ impl FrameSchedule {
             Grid::Tiles => {
                 let tiles = Extent::Tile.of(UVec2::from_array(self.constants.size));
                 Some([tiles.x, tiles.y, 1])
-            }
-            Grid::BlockTiles => {
-                let groups = (Extent::Block.of(UVec2::from_array(self.constants.size)) + (TILE_SIZE - 1)) / TILE_SIZE;
-                Some([groups.x, groups.y, 1])
             }
             Grid::Indirect { .. } => None,
         }

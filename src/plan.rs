@@ -30,8 +30,6 @@ pub enum Grid {
     One,
     /// One for each 8x8 tile of the frame's size.
     Tiles,
-    /// One for each 8x8 blocks of 4x4 pixels.
-    BlockTiles,
     /// Three `u32` in a buffer, written on the GPU.
     Indirect {
         /// Name of the buffer.
@@ -86,8 +84,21 @@ pub struct Plan {
     pub passes: Vec<Pass>,
 }
 
-/// Name of the texture that holds the denoised radiance.
-pub const OUTPUT: &str = "output";
+/// The denoised image, in templates: see [`resource_of`].
+const OUTPUT: &str = "output";
+/// Last frame's, before this frame writes anything.
+const LAST_OUTPUT: &str = "last output";
+
+/// Where a pipeline keeps what templates call by a name.
+fn resource_of(pipeline: Pipeline, name: &'static str, copy: Copy) -> (&'static str, Copy) {
+    match (pipeline, name) {
+        (Pipeline::Published, LAST_OUTPUT) => (OUTPUT, Current),
+        // Once a frame's history has been read the denoised image takes its place.
+        (Pipeline::Footprint, OUTPUT) => ("history", Previous),
+        (Pipeline::Footprint, LAST_OUTPUT) => ("history", Current),
+        _ => (name, copy),
+    }
+}
 
 /// Name of the texture that holds the debug view.
 pub const DEBUG_VIEW: &str = "debug_view";
@@ -96,8 +107,11 @@ pub const DEBUG_VIEW: &str = "debug_view";
 const BLOCKS: &str = "blocks";
 const OTHER_BLOCKS: &str = "other_blocks";
 
-/// What the caller reads: the denoised image, the debug view, and the ray list with its length.
-const EXPORTED: &[&str] = &[OUTPUT, DEBUG_VIEW, "rays", "args"];
+/// Variable of the denoised image in the kernels that write it.
+const OUTPUT_VARIABLE: &str = "out_output";
+
+/// What the caller reads besides the denoised image: the debug view, and the ray list with its length.
+const EXPORTED: &[&str] = &[DEBUG_VIEW, "rays", "args"];
 
 /// A pass before it is known which of its bindings the specialised kernel keeps.
 struct PassTemplate {
@@ -113,7 +127,6 @@ struct PassTemplate {
 enum GridTemplate {
     One,
     Tiles,
-    BlockTiles,
     /// A list of `args`.
     List(u64),
 }
@@ -127,13 +140,14 @@ const FILL: PassTemplate = PassTemplate {
     is_needed: always,
     stage: Stage::Denoise,
     grid: GridTemplate::List(1),
-    overrides: &["FALLBACK"],
+    overrides: &["FALLBACK", "PREV_GUIDE_IS_KEPT"],
     bindings: &[
         ("in_radiance", "radiance", Current),
         ("in_environment", "environment", Current),
         ("in_guide", "guide", Current),
         ("in_tiles", "tiles", Current),
         ("in_args", "args", Current),
+        ("out_prev_guide", "prev_guide", Current),
         ("out_output", OUTPUT, Current),
     ],
 };
@@ -154,6 +168,8 @@ const PASSES: &[PassTemplate] = &[
             "ROUGHNESS_IS_ALPHA",
             "ROUGHNESS_IS_CONSTANT",
             "AVERAGE_IS_USED",
+            "BLOCKS_ARE_USED",
+            "LIGHT_CHANGE",
             "RAYS_PER_QUAD",
             "RAYS_FOLLOW_VARIANCE",
         ],
@@ -161,12 +177,15 @@ const PASSES: &[PassTemplate] = &[
             ("in_normal", "normal", Current),
             ("in_roughness", "roughness", Current),
             ("in_depth", "depth", Current),
-            ("in_history", OUTPUT, Current),
+            ("in_history", LAST_OUTPUT, Current),
             ("out_guide", "guide", Current),
             ("out_average", "average", Current),
             ("out_tiles", "tiles", Current),
             ("out_rays", "rays", Current),
             ("out_counters", "counters", Current),
+            ("out_blocks", BLOCKS, Current),
+            ("out_other_blocks", OTHER_BLOCKS, Current),
+            ("out_light", "light", Current),
         ],
     },
     PassTemplate {
@@ -264,11 +283,13 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "block_average",
         is_needed: always,
         stage: Stage::Denoise,
-        grid: GridTemplate::BlockTiles,
+        grid: GridTemplate::List(3),
         overrides: &["OUTLIER_SPREAD", "SAMPLES_ARE_USED"],
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_guide", "guide", Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
             ("out_blocks", BLOCKS, Current),
             ("out_samples", "samples", Current),
         ],
@@ -278,13 +299,15 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "block_statistics",
         is_needed: always,
         stage: Stage::Denoise,
-        grid: GridTemplate::BlockTiles,
+        grid: GridTemplate::List(3),
         overrides: &["LIGHT_CHANGE", "SURFACE_MOTION"],
         bindings: &[
             ("in_motion", "motion", Current),
             ("in_blocks", BLOCKS, Current),
             ("in_samples", "samples", Current),
             ("in_prev_light", "light", Previous),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
             ("out_blocks", BLOCKS, Current),
             ("out_light", "light", Current),
         ],
@@ -294,9 +317,14 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "block_spread",
         is_needed: |settings| settings.features.outlier_spread,
         stage: Stage::Denoise,
-        grid: GridTemplate::BlockTiles,
+        grid: GridTemplate::List(3),
         overrides: &[],
-        bindings: &[("in_blocks", BLOCKS, Current), ("out_blocks", BLOCKS, Current)],
+        bindings: &[
+            ("in_blocks", BLOCKS, Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
+            ("out_blocks", BLOCKS, Current),
+        ],
     },
     PassTemplate {
         name: "accumulate",
@@ -309,7 +337,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
             ("in_guide", "guide", Current),
-            ("in_prev_guide", "guide", Previous),
+            ("in_prev_guide", "prev_guide", Current),
             ("in_history", "history", Previous),
             ("in_blocks", BLOCKS, Current),
             ("in_samples", "samples", Current),
@@ -331,7 +359,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
             ("in_guide", "guide", Current),
-            ("in_prev_guide", "guide", Previous),
+            ("in_prev_guide", "prev_guide", Current),
             ("in_history", "history", Previous),
             ("in_blocks", BLOCKS, Current),
             ("in_accumulated", "history", Current),
@@ -343,11 +371,13 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "block_average",
         is_needed: has_wide_filter,
         stage: Stage::Denoise,
-        grid: GridTemplate::BlockTiles,
+        grid: GridTemplate::List(3),
         overrides: &["ACCUMULATED"],
         bindings: &[
             ("in_guide", "guide", Current),
             ("in_history", "history", Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
             ("out_blocks", BLOCKS, Current),
         ],
     },
@@ -356,9 +386,14 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "block_spread",
         is_needed: has_wide_filter,
         stage: Stage::Denoise,
-        grid: GridTemplate::BlockTiles,
+        grid: GridTemplate::List(3),
         overrides: &["ACCUMULATED"],
-        bindings: &[("in_blocks", BLOCKS, Current), ("out_blocks", BLOCKS, Current)],
+        bindings: &[
+            ("in_blocks", BLOCKS, Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
+            ("out_blocks", BLOCKS, Current),
+        ],
     },
     FILL,
     PassTemplate {
@@ -376,6 +411,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             ("in_blocks", BLOCKS, Current),
             ("in_tiles", "tiles", Current),
             ("in_args", "args", Current),
+            ("out_prev_guide", "prev_guide", Current),
             ("out_output", OUTPUT, Current),
         ],
     },
@@ -400,7 +436,7 @@ fn all_resources() -> Vec<Resource> {
         kind,
         lifetime,
         ping_pong,
-        exported: EXPORTED.contains(&name),
+        exported: false,
     };
     let texture = |format, extent| Kind::Texture { format, extent };
     let buffer = |stride, count, indirect| Kind::Buffer { stride, count, indirect };
@@ -414,11 +450,12 @@ fn all_resources() -> Vec<Resource> {
         input("motion"),
         input("environment"),
         resource("guide", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
+        resource("prev_guide", texture(Format::R32Uint, Extent::Full), Lifetime::Persistent, false),
         resource("signal", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
         resource(OUTPUT, texture(Format::Rgba16Float, Extent::Full), Lifetime::Persistent, false),
         resource(DEBUG_VIEW, texture(Format::Rgba16Float, Extent::Full), Lifetime::Transient, false),
         resource("average", texture(Format::Rgba16Float, Extent::Tile), Lifetime::Transient, false),
-        resource("history", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
+        resource("history", texture(Format::Rgba16Float, Extent::Full), Lifetime::Persistent, true),
         resource(BLOCKS, texture(Format::Rgba32Uint, Extent::Block), Lifetime::Transient, false),
         resource(OTHER_BLOCKS, texture(Format::Rgba32Uint, Extent::Block), Lifetime::Transient, false),
         resource("samples", texture(Format::Rg32Uint, Extent::Block), Lifetime::Transient, false),
@@ -426,7 +463,7 @@ fn all_resources() -> Vec<Resource> {
         resource("tiles", buffer(4, Count::Per(Extent::Tile), false), Lifetime::Transient, false),
         resource("rays", buffer(4, Count::Per(Extent::Full), false), Lifetime::Transient, false),
         resource("counters", buffer(4, Count::Fixed(4), false), Lifetime::Persistent, false),
-        resource("args", buffer(16, Count::Fixed(3), true), Lifetime::Transient, false),
+        resource("args", buffer(16, Count::Fixed(4), true), Lifetime::Transient, false),
     ]
 }
 
@@ -460,6 +497,7 @@ fn override_value(settings: &Settings, name: &str) -> f64 {
         "RAYS_FOLLOW_VARIANCE" => f64::from(ray_list.is_some_and(|list| list.variance_threshold.is_some())),
         "ROUGHNESS_IS_CONSTANT" => f64::from(features.constant_roughness.is_some()),
         "AVERAGE_IS_USED" => f64::from(settings.pipeline == Pipeline::Published && features.uses_average()),
+        "PREV_GUIDE_IS_KEPT" | "BLOCKS_ARE_USED" => f64::from(settings.pipeline == Pipeline::Footprint),
         // The template that names it means it.
         "ACCUMULATED" => 1.0,
         "LIGHT_CHANGE" => f64::from(features.light_change),
@@ -496,6 +534,10 @@ struct Turns {
 impl Turns {
     fn take(&mut self, bindings: &mut [Bound]) {
         let last = self.other;
+        // A pass that writes both clears them.
+        if bindings.iter().any(|bound| bound.resource == OTHER_BLOCKS) {
+            return;
+        }
         for bound in bindings.iter_mut().filter(|bound| bound.resource == BLOCKS) {
             let writes = bound.access.writes();
             if writes != last {
@@ -516,7 +558,7 @@ fn plan_pass(template: &PassTemplate, settings: &Settings, sources: &Sources) ->
             .bindings
             .iter()
             .find(|(variable, ..)| *variable == binding.name)
-            .map(|&(_, resource, copy)| (resource, copy))
+            .map(|&(_, resource, copy)| resource_of(settings.pipeline, resource, copy))
             .or((binding.name == "frame").then_some(("frame", Current)))
             .ok_or_else(|| Error::Kernel {
                 kernel: template.kernel,
@@ -535,7 +577,6 @@ fn plan_pass(template: &PassTemplate, settings: &Settings, sources: &Sources) ->
     let grid = match template.grid {
         GridTemplate::One => Grid::One,
         GridTemplate::Tiles => Grid::Tiles,
-        GridTemplate::BlockTiles => Grid::BlockTiles,
         GridTemplate::List(index) => Grid::Indirect { resource: "args".to_owned(), offset: index * ARGS_STRIDE },
     };
     let (name, kernel_name) = (template.name.to_owned(), template.kernel.to_owned());
@@ -583,7 +624,28 @@ impl Plan {
             })
         };
         let resources = all_resources().into_iter().filter(|resource| is_used(&resource.name)).collect();
-        Ok((Self { size, resources, passes }, kernels))
+        let mut plan = Self { size, resources, passes };
+        plan.settle_lives();
+        Ok((plan, kernels))
+    }
+
+    /// Keeps no pair of which nobody uses last frame's copy, and notes what the caller reads.
+    fn settle_lives(&mut self) {
+        let output = self.output().map(|(resource, _)| resource.to_owned());
+        let bindings = self.passes.iter().flat_map(|pass| &pass.bindings);
+        for resource in &mut self.resources {
+            if resource.ping_pong && !bindings.clone().any(|b| b.resource == resource.name && b.copy == Previous) {
+                (resource.ping_pong, resource.lifetime) = (false, Lifetime::Transient);
+            }
+            resource.exported = EXPORTED.contains(&resource.name.as_str()) || Some(&resource.name) == output.as_ref();
+        }
+    }
+
+    /// The denoised image when a frame has run: resource and copy. `None` for a plan without one.
+    pub fn output(&self) -> Option<(&str, Copy)> {
+        let mut bindings = self.passes.iter().flat_map(|pass| &pass.bindings);
+        let bound = bindings.find(|bound| bound.variable == OUTPUT_VARIABLE)?;
+        Some((&bound.resource, bound.copy))
     }
 
     /// The resource of that name.
@@ -614,7 +676,6 @@ impl fmt::Display for Plan {
             let grid = match &pass.grid {
                 Grid::One => "one workgroup".to_owned(),
                 Grid::Tiles => "a workgroup per tile".to_owned(),
-                Grid::BlockTiles => "a workgroup per 8x8 blocks".to_owned(),
                 Grid::Indirect { resource, offset } => format!("indirect from {resource} + {offset}"),
             };
             writeln!(f, "{} ({:?}), {grid}", pass.name, pass.stage)?;

@@ -236,12 +236,12 @@ fn a_wrong_sign_of_motion_is_caught() {
 
 #[test]
 fn swapped_history_is_caught() {
-    for (preset, kernel, history) in
-        [(Preset::Default, "accumulate", "history"), (Preset::Reference, "reproject", "signal")]
-    {
+    let swaps =
+        [(Preset::Default, "accumulate", &["history"][..]), (Preset::Reference, "reproject", &["guide", "signal"])];
+    for (preset, kernel, pairs) in swaps {
         let case = lively(preset).case();
         let right = case.run(&mut Cpu::new());
-        for resource in ["guide", history] {
+        for &resource in pairs {
             let (mut plan, kernels) = limpid::Plan::new(&case.settings, case.size).unwrap();
             let passes = plan.passes.iter_mut().filter(|pass| pass.kernel == kernel);
             for bound in passes.flat_map(|pass| &mut pass.bindings).filter(|bound| bound.resource == resource) {

@@ -213,10 +213,10 @@ fn limpids_own_barriers() {
     check(&plan).unwrap();
     let passes: Vec<_> =
         plan.passes.iter().zip(plan.barriers()).filter(|(_, b)| b.is_some()).map(|(p, _)| p.kernel.as_str()).collect();
-    // Passes over blocks wait for each other; `fill` and the second average wait for the same barrier.
+    // Passes wait for each other, but `fill` and the second average wait for the same barrier.
     let (plan, _) = Plan::new(&Settings::default(), UVec2::splat(64)).unwrap();
     check(&plan).unwrap();
-    assert_eq!(plan.barriers().iter().flatten().count(), 8);
+    assert_eq!(plan.barriers().iter().flatten().count(), 9);
     // `fill` only needs what came before `reproject` and runs beside `prefilter`.
     assert_eq!(passes, ["classify", "indirect_args", "reproject", "prefilter", "resolve_temporal"]);
 }

@@ -53,7 +53,8 @@ fn frames_sizes_and_settings_change_without_a_message() {
 
 #[test]
 fn a_frame_has_few_barriers_and_its_passes_have_times() {
-    for (preset, dispatches, barriers, descriptor_writes) in [(Preset::Default, 10, 9, 5), (Preset::Reference, 6, 6, 5)]
+    for (preset, dispatches, barriers, descriptor_writes) in
+        [(Preset::Default, 10, 10, 5), (Preset::Reference, 6, 6, 5)]
     {
         let Some(mut ash) = open(false, false) else { return };
         let mut case = Case::still(SIZE, 3, noisy);

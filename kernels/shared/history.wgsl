@@ -13,25 +13,58 @@ struct History {
     noise: f32,
 }
 
-// Radiance in three half floats; 5 bits of length, 7 of hit share, 4 of the logarithm of noise.
-fn pack_history(history: History) -> vec2<u32> {
-    let words = pack_radiance(history.radiance, 0.0);
+// Half floats that are neither 0, nor denormal, nor infinite, nor NaN have so many bit patterns of either sign. They
+// survive every load and store. There are 32 lengths, 128 hit shares and 15 levels of noise: just as many together.
+const HALF_CODES: u32 = 30720u;
+// The word of the smallest of them as a float, without the bits that a half float has not.
+const FIRST_HALF_CODE: u32 = 113u << 10u;
+
+// Radiance as half floats, and all else in the bits of a fourth one.
+fn pack_history(history: History) -> vec4<f32> {
     let length = u32(round(clamp(history.length, 0.0, 31.0)));
     let share = u32(round(saturate(history.share) * 127.0));
-    // Powers of two from 2^-15 to 2^-1; 0 for what is not known.
-    let level = u32(clamp(round(log2(max(history.noise, 1e-6)) + 16.0), 1.0, 15.0));
+    // Powers of two from 2^-15 to 2^-2; 0 for what is not known.
+    let level = u32(clamp(round(log2(max(history.noise, 1e-6)) + 16.0), 1.0, 14.0));
     let noise = select(level, 0u, history.noise < 0.0);
-    return vec2<u32>(words.x, (words.y & 0xffffu) | (length << 16u) | (share << 21u) | (noise << 28u));
+    let code = length | (share << 5u) | (noise << 12u);
+    let is_negative = code >= HALF_CODES;
+    let magnitude = (select(code, code - HALF_CODES, is_negative) + FIRST_HALF_CODE) << 13u;
+    let other = bitcast<f32>(select(magnitude, magnitude | 0x80000000u, is_negative));
+    let radiance = min(history.radiance, vec3<f32>(HALF_MAX));
+    return vec4<f32>(rounded_to_half(vec4<f32>(radiance, 0.0)).rgb, other);
 }
 
-fn unpack_history(packed: vec2<u32>) -> History {
-    let level = packed.y >> 28u;
+fn unpack_history(texel: vec4<f32>) -> History {
+    let word = bitcast<u32>(texel.a);
+    let magnitude = max((word & 0x7fffffffu) >> 13u, FIRST_HALF_CODE) - FIRST_HALF_CODE;
+    let code = select(magnitude, magnitude + HALF_CODES, (word >> 31u) != 0u);
+    let level = code >> 12u;
     var history: History;
-    history.radiance = vec3<f32>(unpack2x16float(packed.x), unpack2x16float(packed.y & 0xffffu).x);
-    history.length = f32((packed.y >> 16u) & 31u);
-    history.share = f32((packed.y >> 21u) & 127u) * (1.0 / 127.0);
+    history.radiance = texel.rgb;
+    history.length = f32(code & 31u);
+    history.share = f32((code >> 5u) & 127u) * (1.0 / 127.0);
     history.noise = select(exp2(f32(level) - 16.0), -1.0, level == 0u);
     return history;
+}
+
+// What is kept of last frame's G-buffer: 16 bits of depth, 12 of normal, 4 of roughness. 0 where nothing is denoised.
+fn pack_prev_guide(guide: Guide) -> u32 {
+    // From 2^-31 to 2^31 units, 10 bits of mantissa, rounded.
+    let depth = clamp(guide.depth, 4.7e-10, 2.1e9);
+    let depth_word = ((bitcast<u32>(depth) + 0x1000u) >> 13u) - (95u << 10u);
+    let oct = vec2<u32>(round((oct_encode(guide.normal) * 0.5 + 0.5) * 63.0));
+    let roughness = u32(round(saturate(guide.roughness) * 15.0));
+    return select(0u, depth_word | (oct.x << 16u) | (oct.y << 22u) | (roughness << 28u), guide.denoised);
+}
+
+fn unpack_prev_guide(word: u32) -> Guide {
+    let oct = vec2<f32>(vec2<u32>(word >> 16u, word >> 22u) & vec2<u32>(63u)) * (2.0 / 63.0) - 1.0;
+    var guide: Guide;
+    guide.normal = oct_decode(oct);
+    guide.depth = bitcast<f32>(((word & 0xffffu) + (95u << 10u)) << 13u);
+    guide.roughness = f32(word >> 28u) * (1.0 / 15.0);
+    guide.denoised = word != 0u;
+    return guide;
 }
 
 // Position relative to this frame's camera of what a texel of last frame showed.

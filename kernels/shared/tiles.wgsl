@@ -18,6 +18,9 @@ fn unpack_tile(packed: u32) -> vec2<u32> {
     return vec2<u32>(packed & 0xffffu, packed >> 16u);
 }
 
+// Tiles that a workgroup of 64 invocations handles, each of which handles a block of 4x4 pixels.
+const TILES_PER_BLOCK_GROUP: u32 = 16u;
+
 // Position in its list that a workgroup of an indirect grid handles.
 fn list_index(group: vec3<u32>) -> u32 {
     return group.y * LIST_GRID_WIDTH + group.x;
@@ -26,4 +29,14 @@ fn list_index(group: vec3<u32>) -> u32 {
 // Position inside an 8x8 tile of an invocation.
 fn lane_position(lane: u32) -> vec2<u32> {
     return vec2<u32>(lane % TILE_SIZE, lane / TILE_SIZE);
+}
+
+// Position in its list of the tile that an invocation handles a block of.
+fn block_list_index(group: vec3<u32>, lane: u32) -> u32 {
+    return list_index(group) * TILES_PER_BLOCK_GROUP + lane / 4u;
+}
+
+// That block of the tile.
+fn block_of_tile(tile: vec2<u32>, lane: u32) -> vec2<u32> {
+    return tile * 2u + vec2<u32>(lane & 1u, (lane >> 1u) & 1u);
 }

@@ -130,13 +130,24 @@ impl Export<'_> {
         let passes: Vec<_> =
             self.plan.passes.iter().map(|p| format!("    LIMPID_PASS_{},\n", upper(&p.name))).collect();
         format!(
-            "\n/* ---- The plan {} */\n\nenum {{\n{}    LIMPID_RESOURCE_COUNT\n}};\n\nenum {{\n{}    LIMPID_PASS_COUNT\n}};\n\n{}{}{}",
+            "\n/* ---- The plan {} */\n\nenum {{\n{}    LIMPID_RESOURCE_COUNT\n}};\n\nenum {{\n{}    LIMPID_PASS_COUNT\n}};\n\n{}{}{}{}",
             "-".repeat(98),
             names.concat(),
             passes.concat(),
+            self.output_macros(),
             include_str!("tables.h"),
             self.resource_table(),
             self.pass_table(),
+        )
+    }
+
+    fn output_macros(&self) -> String {
+        let output = self.output_entry();
+        format!(
+            "/* The denoised image, and whether it is the previous copy: in frame n then copy 1 - n % 2. */\n\
+             #define LIMPID_OUTPUT LIMPID_RESOURCE_{}\n#define LIMPID_OUTPUT_IS_PREVIOUS {}\n\n",
+            upper(&output.resource),
+            u8::from(output.copy == Copy::Previous)
         )
     }
 
@@ -199,7 +210,6 @@ impl Export<'_> {
             text += &format!("static const LimpidBinding {table}[{}] = {{\n{bindings}}};\n\n", pass.bindings.len());
             let (grid, resource, offset) = match &pass.grid {
                 Grid::One => ("ONE", "-1".to_owned(), 0),
-                Grid::BlockTiles => ("BLOCK_TILES", "-1".to_owned(), 0),
                 Grid::Tiles => ("TILES", "-1".to_owned(), 0),
                 Grid::Indirect { resource, offset } => {
                     ("INDIRECT", format!("LIMPID_RESOURCE_{}", upper(resource)), *offset)

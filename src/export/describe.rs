@@ -2,7 +2,7 @@
 
 use super::manifest::{
     Argument, BindingEntry, Constants, DependencyEntry, Descriptor, Field, FileEntry, GlslBinding, GridEntry,
-    GroupBinding, Manifest, MemoryEntry, PassEntry, Register, ResourceEntry, ResourceKind, Shader,
+    GroupBinding, Manifest, MemoryEntry, OutputEntry, PassEntry, Register, ResourceEntry, ResourceKind, Shader,
 };
 use super::{Export, File, Target, formats, sha256};
 use crate::FrameConstants;
@@ -70,11 +70,17 @@ impl Export<'_> {
                 size: size_of::<FrameConstants>(),
                 fields: FrameConstants::FIELDS.iter().map(field).collect(),
             },
+            output: self.output_entry(),
             resources: self.plan.resources.iter().map(|resource| self.resource_entry(resource)).collect(),
             passes: (0..self.plan.passes.len()).map(|index| self.pass_entry(index)).collect(),
             memory: self.memory_entry(),
             files: files.iter().map(file).collect(),
         }
+    }
+
+    pub(super) fn output_entry(&self) -> OutputEntry {
+        let (resource, copy) = self.plan.output().expect("plans of settings have an output");
+        OutputEntry { resource: resource.to_owned(), copy }
     }
 
     fn resource_entry(&self, resource: &Resource) -> ResourceEntry {
@@ -139,7 +145,6 @@ impl Export<'_> {
             workgroup_size: kernel.workgroup_size,
             grid: match &pass.grid {
                 Grid::One => GridEntry::Direct { x: "1", y: "1", z: "1" },
-                Grid::BlockTiles => GridEntry::Direct { x: "(width + 31) / 32", y: "(height + 31) / 32", z: "1" },
                 Grid::Tiles => GridEntry::Direct { x: "(width + 7) / 8", y: "(height + 7) / 8", z: "1" },
                 Grid::Indirect { resource, offset } => {
                     GridEntry::Indirect { resource: resource.clone(), offset: *offset }

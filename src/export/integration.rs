@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::manifest::{BindingEntry, GridEntry, Manifest, PassEntry, ResourceEntry, ResourceKind};
+use super::manifest::{BindingEntry, GridEntry, Manifest, OutputEntry, PassEntry, ResourceEntry, ResourceKind};
 use super::{Export, MANIFEST, Target};
 use crate::plan::{DEBUG_VIEW, Stage};
 use crate::resource::{Copy, Lifetime};
@@ -106,13 +106,14 @@ impl Export<'_> {
             "## Steps\n\n1. {}\n2. Allocate the resources below; those with two copies twice. Before the first frame, and after a resize, set \
              what is persistent to zero: {}.\n3. Every frame, fill a constant buffer of {} bytes with `limpid_fill_constants` of `limpid.h`, from this frame's camera and the camera and size of the frame that was denoised last. Count \
              frames: in frame `n` the current copy of a pair is `n % 2`, the previous one the other.\n4. Dispatch {}.\n5. {rays} \
-             Your images: {}.\n6. Dispatch {}. The result is in `output`, which is also next frame's history: leave it as it is.\n\n",
+             Your images: {}.\n6. Dispatch {}. The result is in {}: leave it as it is.\n\n",
             words.pipeline,
             words.clear,
             manifest.constants.size,
             list(&mut stage(Stage::Classify)),
             inputs.join(", "),
             list(&mut stage(Stage::Denoise)),
+            output_text(manifest),
         )
     }
 
@@ -153,6 +154,18 @@ impl Export<'_> {
             "| depth | {depth} |\n| normal | {normal} |\n| roughness | {roughness}, channel {:?} |\n| clip space | `y` {:?} |\n",
             conventions.roughness_channel, conventions.ndc_y
         )
+    }
+}
+
+fn output_text(manifest: &Manifest) -> String {
+    let OutputEntry { resource, copy } = &manifest.output;
+    match copy {
+        Copy::Current => format!("`{resource}`, which is also next frame's history"),
+        Copy::Previous => {
+            format!(
+                "the previous copy of `{resource}`, so in another texture every frame; the current copy is next frame's history"
+            )
+        }
     }
 }
 

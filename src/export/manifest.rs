@@ -36,6 +36,8 @@ pub struct Manifest {
     pub tile_size: u32,
     /// The constant buffer.
     pub constants: Constants,
+    /// The denoised image.
+    pub output: OutputEntry,
     /// Textures and buffers to supply or to allocate.
     pub resources: Vec<ResourceEntry>,
     /// Dispatches, in order.
@@ -66,6 +68,15 @@ pub struct Field {
     pub size: usize,
     /// `float`, `uint2`, `float4`, `float4x4`...
     pub r#type: String,
+}
+
+/// Where the denoised image is when all passes of a frame have run, until the next frame's second stage begins.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct OutputEntry {
+    /// Name of the resource.
+    pub resource: String,
+    /// Which copy of it.
+    pub copy: Copy,
 }
 
 /// What a resource is.

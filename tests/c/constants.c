@@ -19,8 +19,7 @@ int main(void) {
         return 3;
     }
     limpid_extent(&limpid_resources[LIMPID_RESOURCE_BLOCKS], 1921, 1080, extent);
-    limpid_grid(&limpid_passes[LIMPID_PASS_BLOCK_AVERAGE], 1921, 1080, grid);
-    if (extent[0] != 481 || extent[1] != 270 || grid[0] != 61 || grid[1] != 34 || grid[2] != 1) {
+    if (extent[0] != 481 || extent[1] != 270 || limpid_passes[LIMPID_PASS_BLOCK_AVERAGE].grid != LIMPID_GRID_INDIRECT) {
         return 4;
     }
     while (fread(&record, sizeof record, 1, stdin) == 1) {

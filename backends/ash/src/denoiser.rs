@@ -3,7 +3,7 @@ use std::sync::Arc;
 use ash::vk;
 use glam::UVec2;
 use limpid::kernel::Binding;
-use limpid::plan::{DEBUG_VIEW, Grid, OUTPUT, Stage};
+use limpid::plan::{DEBUG_VIEW, Grid, Stage};
 use limpid::resource::Copy;
 use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
@@ -426,11 +426,12 @@ impl Denoiser {
     }
 
     /// The denoised image, `R16G16B16A16_SFLOAT` in the layout `GENERAL`: `rgb` radiance, `a` variance. After the
-    /// recorded frame it is visible to [`Options::reader_stages`]. It is also next frame's history: the next
-    /// frame's commands wait for those stages before they overwrite it; do not write it. Stays the same until
-    /// [`resize`](Self::resize) or a change of settings that makes everything anew.
+    /// recorded frame it is visible to [`Options::reader_stages`]; the next frame's commands wait for those stages
+    /// before they overwrite it. Do not write it. It can be another image from frame to frame, one of two: ask for it
+    /// after each.
     pub fn output(&self) -> OwnImage {
-        self.intermediate_image(OUTPUT, Copy::Current).expect("every plan has an output")
+        let output = self.core.plan().output();
+        output.and_then(|(name, copy)| self.intermediate_image(name, copy)).expect("every plan has an output")
     }
 
     /// The debug view, `R16G16B16A16_SFLOAT` in the layout `GENERAL`: linear colours, 0 to 1, as

@@ -2,7 +2,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::UVec2;
 use limpid::kernel::Kernel;
-use limpid::plan::{Bound, DEBUG_VIEW, Grid, OUTPUT, Pass, Stage};
+use limpid::plan::{Bound, DEBUG_VIEW, Grid, Pass, Stage};
 use limpid::resource::{Copy, Format, Kind};
 use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
@@ -300,9 +300,10 @@ impl Denoiser {
         find_texture(self.core.plan(), &self.allocations, name, copy, phase)
     }
 
-    /// The denoised image of the last frame: `rgb` radiance, `a` variance. Also next frame's history.
+    /// The denoised image of the last frame: `rgb` radiance, `a` variance. It can be another texture from frame to frame.
     pub fn output(&self) -> &Texture {
-        self.intermediate_texture(OUTPUT, Copy::Current).expect("every plan has an output")
+        let output = self.core.plan().output();
+        output.and_then(|(name, copy)| self.intermediate_texture(name, copy)).expect("every plan has an output")
     }
 
     /// The debug view of the last frame: linear colours, 0 to 1, as [`limpid::DebugView::legend`] explains them. `None`

@@ -1,5 +1,5 @@
 use glam::UVec2;
-use limpid::plan::{Bound, DEBUG_VIEW, Grid, OUTPUT, Stage};
+use limpid::plan::{Bound, DEBUG_VIEW, Grid, Stage};
 use limpid::resource::Copy;
 use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
@@ -293,9 +293,9 @@ impl Denoiser {
         }
     }
 
-    /// The denoised image of the frame recorded last, `Rgba16Float`: `rgb` radiance, `a` variance. It is also
-    /// next frame's history: read it before the next frame's denoise stage runs, and do not write it. Stays
-    /// the same until [`resize`](Self::resize) or a change of settings that makes everything anew.
+    /// The denoised image of the frame recorded last, `Rgba16Float`: `rgb` radiance, `a` variance. Read it
+    /// before the next frame's denoise stage runs, and do not write it. It can be another texture from frame to frame,
+    /// one of two: ask for it after each.
     pub fn output(&self) -> &wgpu::TextureView {
         let (_, view) = self.output_pair();
         view
@@ -308,7 +308,9 @@ impl Denoiser {
     }
 
     fn output_pair(&self) -> &(wgpu::Texture, wgpu::TextureView) {
-        let output = self.allocations.texture(self.core.plan(), OUTPUT, Copy::Current, self.core.phase());
+        let plan = self.core.plan();
+        let output =
+            plan.output().and_then(|(name, copy)| self.allocations.texture(plan, name, copy, self.core.phase()));
         output.expect("every plan has an output")
     }
 

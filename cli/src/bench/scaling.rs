@@ -26,7 +26,7 @@ pub const SIZES: [UVec2; 9] = [
 ];
 
 /// Shares of tiles.
-const SHARES: [f64; 6] = [0.0, 0.1, 0.25, 0.5, 0.75, 1.0];
+const SHARES: [f64; 7] = [0.0, 0.05, 0.1, 0.25, 0.5, 0.75, 1.0];
 
 /// Frames timed at each point, after as many to warm up as history needs.
 const TIMED: usize = 5;

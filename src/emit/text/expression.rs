@@ -2,7 +2,7 @@
 
 use naga::{Expression, Handle, ImageQuery, RelationalFunction, Type, TypeInner, UnaryOperator};
 
-use super::language::{Binds, Operand, Text, call, shape};
+use super::language::{Binds, Operand, Text, call, is_integer, shape};
 use super::{Scope, Writer, operators};
 
 type Result<T> = std::result::Result<T, String>;
@@ -90,7 +90,8 @@ impl Writer<'_> {
                 let handles = [Some(arg), arg1, arg2, arg3].into_iter().flatten();
                 let operands = handles.map(|handle| self.operand(scope, handle)).collect::<Result<Vec<_>>>()?;
                 let written = self.language.math(fun, &operands);
-                let (text, helper) = written.ok_or_else(|| format!("the function {fun:?} has no text form"))?;
+                let of = if operands.iter().any(|operand| is_integer(operand.ty)) { " of integers" } else { "" };
+                let (text, helper) = written.ok_or_else(|| format!("the function {fun:?}{of} has no text form"))?;
                 helper.map(|name| self.helper(name));
                 Ok(text)
             }

@@ -4,7 +4,7 @@ use naga::{AtomicFunction, BinaryOperator, ImageQuery, MathFunction, Scalar, Sca
 use serde::{Deserialize, Serialize};
 
 use super::heading::Note;
-use super::language::{Helper, Language, Operand, Text, call, common_function, is_unsigned};
+use super::language::{Helper, Language, Operand, Text, call, common_function, is_integer, is_unsigned};
 use super::words;
 use crate::Error;
 use crate::kernel::{Binding, BindingKind, Kernel};
@@ -280,6 +280,8 @@ impl Language for GlslOptions {
             M::Mix => "mix",
             M::Atan2 => "atan",
             M::Round => "roundEven",
+            // GLSL has it for floats alone.
+            M::Dot if is_integer(operands[0].ty) => return None,
             M::Fma => "fma",
             M::Pack2x16float => "packHalf2x16",
             M::Unpack2x16float => "unpackHalf2x16",

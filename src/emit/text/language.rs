@@ -62,6 +62,11 @@ pub(super) fn is_unsigned(inner: &TypeInner) -> bool {
     shape(inner).is_some_and(|(scalar, _)| scalar.kind == ScalarKind::Uint)
 }
 
+/// Whether a scalar or vector is one of integers, signed or not.
+pub(super) fn is_integer(inner: &TypeInner) -> bool {
+    shape(inner).is_some_and(|(scalar, _)| matches!(scalar.kind, ScalarKind::Sint | ScalarKind::Uint))
+}
+
 /// An operand: its text and type.
 pub(super) struct Operand<'a> {
     pub(super) text: Text,

@@ -4,7 +4,7 @@ use naga::{AtomicFunction, ImageQuery, Literal, MathFunction, ScalarKind, TypeIn
 use serde::{Deserialize, Serialize};
 
 use super::heading::Note;
-use super::language::{Helper, Language, Operand, Text, c_literal, call, common_function, is_unsigned};
+use super::language::{Helper, Language, Operand, Text, c_literal, call, common_function, is_integer, is_unsigned};
 use super::words;
 use crate::Error;
 use crate::kernel::{Binding, BindingKind, Kernel};
@@ -190,6 +190,10 @@ impl Language for MslOptions {
 
     fn math(&self, fun: MathFunction, operands: &[Operand]) -> Option<(Text, Option<Helper>)> {
         use MathFunction as M;
+        // Metal has them for floats alone.
+        if matches!(fun, M::Dot | M::Sign) && is_integer(operands[0].ty) {
+            return None;
+        }
         let helper = match fun {
             M::Pack2x16float => Some("pack_half2"),
             M::Unpack2x16float => Some("unpack_half2"),

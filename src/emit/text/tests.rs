@@ -1,6 +1,6 @@
 //! The shape of what is written.
 
-use crate::emit::WgslOptions;
+use crate::emit::{GlslOptions, HlslOptions, MslOptions, WgslOptions};
 use crate::kernel::Kernel;
 
 /// The body of the entry point of a module that has one buffer, `data`.
@@ -65,4 +65,29 @@ fn what_has_no_text_form_is_refused_by_name() {
          @compute @workgroup_size(1)\nfn fill() {\n switch data[0] { case 1u: { data[1] = 1u; } default: {} }\n}\n";
     let error = Kernel::from_text("fill", text).unwrap().wgsl(&WgslOptions::default()).unwrap_err().to_string();
     assert!(error.contains("kernel `fill` failed to write WGSL") && error.contains("Switch"), "{error}");
+}
+
+#[test]
+fn functions_of_integers_that_a_language_lacks_are_refused_by_name() {
+    let kernel = |expression: &str| {
+        let text = format!(
+            "@group(0) @binding(0) var<storage, read_write> data: array<i32, 4>;\n\
+             @compute @workgroup_size(1)\nfn fill() {{\n let a = vec2<i32>(data[0], data[1]);\n data[2] = {expression};\n}}\n"
+        );
+        Kernel::from_text("fill", &text).unwrap()
+    };
+    let (dot, sign) = (kernel("dot(a, a.yx)"), kernel("sign(a.x)"));
+    let (msl, glsl, hlsl) = (MslOptions::default(), GlslOptions::default(), HlslOptions::default());
+    for (result, function, stage) in [
+        (dot.msl(&msl), "Dot", "write MSL"),
+        (sign.msl(&msl), "Sign", "write MSL"),
+        (dot.glsl(&glsl), "Dot", "write GLSL"),
+    ] {
+        let error = result.unwrap_err().to_string();
+        assert!(error.contains(stage) && error.contains(&format!("{function} of integers")), "{error}");
+    }
+    assert!(dot.hlsl(&hlsl).unwrap().contains("dot(a, a.yx)"));
+    assert!(sign.glsl(&glsl).unwrap().contains("sign(a.x)"));
+    // Those of floats are written.
+    assert!(kernel("i32(dot(vec2<f32>(a), vec2<f32>(0.5, f32(a.y))))").msl(&msl).unwrap().contains("dot(float2(a), "));
 }

@@ -31,6 +31,7 @@ typedef struct Pass {
 
 struct Denoiser {
     const Gpu *gpu;
+    const Json *output; /* of the manifest: resource and copy */
     Resource *resources;
     Pass *passes;
     uint32_t resource_count, pass_count;
@@ -74,6 +75,7 @@ static void make_resource(const Gpu *gpu, const Json *entry, uint32_t width, uin
 }
 
 static void make_resources(Denoiser *denoiser, const Json *manifest, uint32_t width, uint32_t height) {
+    denoiser->output = json_get(manifest, "output");
     const Json *entries = json_get(manifest, "resources"), *entry = entries->first;
     denoiser->resource_count = entries->count;
     denoiser->resources = calloc(entries->count, sizeof(Resource));
@@ -137,13 +139,17 @@ static void make_pipeline(const Gpu *gpu, const char *folder, Pass *pass) {
     free(code);
 }
 
+/* The copy that an entry of the manifest names. */
+static const Image *image_in_phase(const Resource *resource, const Json *entry, uint32_t phase) {
+    const int is_previous = json_is(entry, "copy", "previous");
+    return &resource->images[resource->copies == 2 ? (is_previous ? 1 - phase : phase) : 0];
+}
+
 static void write_descriptor(const Denoiser *denoiser, VkDescriptorSet set, const Json *binding, uint32_t phase) {
     const Resource *resource = find_resource(denoiser, json_string(binding, "resource"));
-    const int is_previous = json_is(binding, "copy", "previous");
-    const uint32_t copy = resource->copies == 2 ? (is_previous ? 1 - phase : phase) : 0;
     const VkDescriptorBufferInfo buffer = {.buffer = resource->buffer.buffer, .range = VK_WHOLE_SIZE};
     const VkDescriptorImageInfo image = {
-        .imageView = resource->is_texture ? resource->images[copy].view
+        .imageView = resource->is_texture ? image_in_phase(resource, binding, phase)->view
                      : resource->input    ? resource->input->view
                                           : VK_NULL_HANDLE,
         .imageLayout = resource->is_texture ? VK_IMAGE_LAYOUT_GENERAL : VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL};
@@ -335,6 +341,7 @@ void *denoiser_constants(const Denoiser *denoiser) {
     return find_resource(denoiser, "frame")->buffer.mapped;
 }
 
-const Image *denoiser_output(const Denoiser *denoiser) {
-    return &find_resource(denoiser, "output")->images[0];
+const Image *denoiser_output(const Denoiser *denoiser, uint32_t number) {
+    return image_in_phase(find_resource(denoiser, json_string(denoiser->output, "resource")), denoiser->output,
+                          number % PHASES);
 }

@@ -33,7 +33,7 @@ void denoiser_record(const Denoiser *denoiser, VkCommandBuffer commands, const c
 /* The constant buffer, to be filled before a frame is submitted. */
 void *denoiser_constants(const Denoiser *denoiser);
 
-/* The denoised image, in VK_IMAGE_LAYOUT_GENERAL, as the last compute shader wrote it. */
-const Image *denoiser_output(const Denoiser *denoiser);
+/* The denoised image of frame `number`, in VK_IMAGE_LAYOUT_GENERAL, as the last compute shader wrote it. */
+const Image *denoiser_output(const Denoiser *denoiser, uint32_t number);
 
 #endif

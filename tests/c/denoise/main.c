@@ -108,7 +108,7 @@ static void write_output(const char *folder, uint32_t number, const Buffer *read
 
 static void denoise_frame(const Gpu *gpu, const Denoiser *denoiser, const Sequence *sequence, const Buffer *readback,
                           uint32_t number, const uint32_t size[2]) {
-    const Image *output = denoiser_output(denoiser);
+    const Image *output = denoiser_output(denoiser, number);
     VkCommandBuffer commands = commands_begin(gpu);
     if (number == 0) {
         denoiser_clear(denoiser, commands);

@@ -60,14 +60,22 @@ struct Accumulated {
     resource: &'static str,
     /// Bits of each of those numbers, the length first.
     bits: &'static [u32],
+    /// The bits from the upper half of the word.
+    decode: fn(u32) -> u32,
+}
+
+/// Normal half floats counted from the smallest, the positive ones first.
+fn half_code(bits: u32) -> u32 {
+    let magnitude = (bits & 0x7fff).saturating_sub(0x400);
+    if bits & 0x8000 == 0 { magnitude } else { magnitude + 0x7800 }
 }
 
 impl Accumulated {
     const ALL: &[Self] = &[
         // Length and variance.
-        Self { resource: "signal", bits: &[8, 8] },
+        Self { resource: "signal", bits: &[8, 8], decode: |half| half },
         // Length, hit share and noise.
-        Self { resource: "history", bits: &[5, 7, 4] },
+        Self { resource: "history", bits: &[5, 7, 4], decode: half_code },
     ];
 
     /// That of the pipeline which left a snapshot.
@@ -77,7 +85,7 @@ impl Accumulated {
     }
 
     fn fields(&self, word: u32) -> impl Iterator<Item = u32> {
-        let mut rest = word >> 16;
+        let mut rest = (self.decode)(word >> 16);
         self.bits.iter().map(move |bits| {
             let field = rest & ((1 << bits) - 1);
             rest >>= bits;
@@ -104,10 +112,6 @@ impl Table {
             let accumulated = Accumulated::ALL.iter().find(|accumulated| accumulated.resource == name);
             let is_halves = accumulated.is_some()
                 || matches!(name.as_str(), "previous signal" | "average" | "output" | "debug_view");
-            // Compared in the frame that wrote it.
-            if name == "previous history" {
-                continue;
-            }
             for (index, (&word, &other)) in words.iter().zip(others).enumerate() {
                 // Where nothing is denoised it holds what was there before.
                 if accumulated.is_some() && !(is_denoised(a, index / 2) && is_denoised(b, index / 2)) {

@@ -20,12 +20,17 @@ impl Snapshot {
         for resource in plan.resources.iter().filter(|resource| is_readable(resource)) {
             let name = resource.name.as_str();
             match resource.kind {
-                Kind::Texture { .. } if resource.ping_pong => {
-                    words.insert(name.to_owned(), texture(name, Copy::Current));
-                    words.insert(format!("previous {name}"), texture(name, Copy::Previous));
-                }
                 Kind::Texture { .. } => {
-                    words.insert(name.to_owned(), texture(name, Copy::Current));
+                    let copies =
+                        if resource.ping_pong { &[Copy::Current, Copy::Previous][..] } else { &[Copy::Current] };
+                    for &copy in copies {
+                        let key = match copy {
+                            _ if plan.output() == Some((name, copy)) => "output".to_owned(),
+                            Copy::Current => name.to_owned(),
+                            Copy::Previous => format!("previous {name}"),
+                        };
+                        words.insert(key, texture(name, copy));
+                    }
                 }
                 Kind::Buffer { .. } => {
                     words.insert(name.to_owned(), buffer(name));
