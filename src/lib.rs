@@ -52,10 +52,14 @@
 //! large, pixels are hundreds of times too large) everything turns noisy while the camera moves,
 //! because history is rejected, and calms down as soon as it stops. Mirror-like flat surfaces hide all this:
 //! they follow the hit distance and the camera matrices instead; look at rough or curved ones.
+//!
+//! [`DebugView::MotionError`] shows all of this at a glance: it is black where motion vectors are what the camera's
+//! motion makes them. The other [`DebugView`]s show where history is lost, and why.
 
 #![forbid(unsafe_code)]
 
 mod dead_code;
+mod debug_view;
 mod denoiser;
 pub mod emit;
 mod error;
@@ -69,6 +73,7 @@ pub mod resource;
 pub mod settings;
 pub mod synchronization;
 
+pub use debug_view::{DebugView, Key, Legend};
 pub use denoiser::{Denoiser, FrameSchedule};
 pub use error::Error;
 pub use frame::{Camera, FrameConstants, FrameInputs};

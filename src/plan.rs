@@ -102,6 +102,9 @@ fn resource_of(pipeline: Pipeline, name: &'static str, copy: Copy) -> (&'static 
     }
 }
 
+/// Name of the texture that holds the debug view.
+pub const DEBUG_VIEW: &str = "debug_view";
+
 /// Averages over blocks of pixels, of which there are two.
 const BLOCKS: &str = "blocks";
 const OTHER_BLOCKS: &str = "other_blocks";
@@ -109,8 +112,8 @@ const OTHER_BLOCKS: &str = "other_blocks";
 /// Variable of the denoised image in the kernels that write it.
 const OUTPUT_VARIABLE: &str = "out_output";
 
-/// What the caller reads besides the denoised image: the ray list with its length.
-const EXPORTED: &[&str] = &["rays", "args"];
+/// What the caller reads besides the denoised image: the debug view, and the ray list with its length.
+const EXPORTED: &[&str] = &[DEBUG_VIEW, "rays", "args"];
 
 /// A pass before it is known which of its bindings the specialised kernel keeps.
 struct PassTemplate {
@@ -227,6 +230,25 @@ const PASSES: &[PassTemplate] = &[
             ("out_average", "average", Current),
         ],
     },
+    // While last frame's textures are what `reproject` saw.
+    PassTemplate {
+        name: DEBUG_VIEW,
+        kernel: "debug_view_published",
+        is_needed: has_debug_view,
+        stage: Stage::Denoise,
+        grid: GridTemplate::Tiles,
+        overrides: &["VIEW", "MIRROR_PARALLAX", "SURFACE_MOTION", "HISTORY_SEARCH", "EDGE_REPAIR"],
+        bindings: &[
+            ("in_radiance", "radiance", Current),
+            ("in_motion", "motion", Current),
+            ("in_guide", "guide", Current),
+            ("in_prev_guide", "guide", Previous),
+            ("in_history", OUTPUT, Current),
+            ("in_reprojected", "signal", Current),
+            ("in_average", "average", Current),
+            ("out_debug_view", DEBUG_VIEW, Current),
+        ],
+    },
     PassTemplate {
         name: "prefilter",
         kernel: "prefilter",
@@ -338,6 +360,25 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             ("out_history", "history", Current),
         ],
     },
+    // While last frame's textures and the blocks are what `accumulate` saw.
+    PassTemplate {
+        name: DEBUG_VIEW,
+        kernel: "debug_view",
+        is_needed: has_debug_view,
+        stage: Stage::Denoise,
+        grid: GridTemplate::Tiles,
+        overrides: &["VIEW", "MIRROR_PARALLAX", "SURFACE_MOTION"],
+        bindings: &[
+            ("in_radiance", "radiance", Current),
+            ("in_motion", "motion", Current),
+            ("in_guide", "guide", Current),
+            ("in_prev_guide", "prev_guide", Current),
+            ("in_history", "history", Previous),
+            ("in_blocks", BLOCKS, Current),
+            ("in_accumulated", "history", Current),
+            ("out_debug_view", DEBUG_VIEW, Current),
+        ],
+    },
     PassTemplate {
         name: "block_average_accumulated",
         kernel: "block_average",
@@ -397,6 +438,10 @@ fn has_wide_filter(settings: &Settings) -> bool {
     settings.features.spatial_filter && settings.features.wide_filter
 }
 
+fn has_debug_view(settings: &Settings) -> bool {
+    settings.features.debug_view.is_some()
+}
+
 /// All resources that passes can name.
 fn all_resources() -> Vec<Resource> {
     let resource = |name: &str, kind, lifetime, ping_pong| Resource {
@@ -421,6 +466,7 @@ fn all_resources() -> Vec<Resource> {
         resource("prev_guide", texture(Format::R32Uint, Extent::Full), Lifetime::Persistent, false),
         resource("signal", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
         resource(OUTPUT, texture(Format::Rgba16Float, Extent::Full), Lifetime::Persistent, false),
+        resource(DEBUG_VIEW, texture(Format::Rgba16Float, Extent::Full), Lifetime::Transient, false),
         resource("average", texture(Format::Rgba16Float, Extent::Tile), Lifetime::Transient, false),
         resource("history", texture(Format::Rgba16Float, Extent::Full), Lifetime::Persistent, true),
         resource(BLOCKS, texture(Format::Rgba32Uint, Extent::Block), Lifetime::Transient, false),
@@ -479,6 +525,8 @@ fn override_value(settings: &Settings, name: &str) -> f64 {
         "HISTORY_SEARCH" => f64::from(features.history_search),
         "EDGE_REPAIR" => f64::from(features.edge_repair),
         "SPATIAL_FILTER" => f64::from(features.spatial_filter),
+        // Only templates of the debug view name it.
+        "VIEW" => features.debug_view.map_or(0.0, |view| f64::from(view as u8)),
         "HISTORY_CLIP" => f64::from(features.history_clip),
         "AVERAGE_MIXING" => f64::from(features.average_mixing),
         "FALLBACK" => match settings.coverage.fallback {

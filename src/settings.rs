@@ -3,7 +3,7 @@
 use glam::{Mat3, Vec2};
 use serde::{Deserialize, Serialize};
 
-use crate::Error;
+use crate::{DebugView, Error};
 
 /// A named set of settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -282,6 +282,8 @@ pub struct Features {
     pub near_taps: u32,
     /// Perceptual roughness, 0 to 1, where it is the same everywhere: then there is no `roughness` input.
     pub constant_roughness: Option<f32>,
+    /// Shows in colours what limpid finds out about each pixel, in one more pass and texture.
+    pub debug_view: Option<DebugView>,
 }
 
 impl Default for Features {
@@ -299,6 +301,7 @@ impl Default for Features {
             wide_filter: true,
             near_taps: 12,
             constant_roughness: None,
+            debug_view: None,
         }
     }
 }
@@ -309,10 +312,18 @@ impl Features {
         self.spatial_filter || self.history_clip || self.average_mixing
     }
 
-    fn validate(&self) -> Result<(), Error> {
+    fn validate(&self, pipeline: Pipeline) -> Result<(), Error> {
+        let refuse = |reason| Err(Error::Features { reason });
         if !self.mirror_parallax && !self.surface_motion {
-            let reason = "without mirror_parallax and surface_motion there is no history to find";
-            return Err(Error::Features { reason });
+            return refuse("without mirror_parallax and surface_motion there is no history to find");
+        }
+        if self.debug_view == Some(DebugView::MotionError) && !self.surface_motion {
+            return refuse("the debug view motion-error needs motion vectors, which are read with surface_motion only");
+        }
+        if self.debug_view == Some(DebugView::Average) && pipeline == Pipeline::Published && !self.uses_average() {
+            return refuse(
+                "the debug view average needs an average: spatial_filter, history_clip or average_mixing has to be on",
+            );
         }
         check_range("features.near_taps", self.near_taps as f32, 0.0, 64.0, "0 to 64")?;
         if let Some(roughness) = self.constant_roughness {
@@ -524,7 +535,7 @@ impl Settings {
     ///
     /// [`Error::Setting`] for the first one outside.
     pub fn validate(&self) -> Result<(), Error> {
-        self.features.validate()?;
+        self.features.validate(self.pipeline)?;
         self.accumulate.validate()?;
         self.footprint.validate()?;
         self.reproject.validate()?;

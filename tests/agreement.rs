@@ -236,10 +236,8 @@ fn a_wrong_sign_of_motion_is_caught() {
 
 #[test]
 fn swapped_history_is_caught() {
-    let swaps = [
-        (Preset::Default, "accumulate", &["history"][..]),
-        (Preset::Reference, "reproject", &["guide", "signal"]),
-    ];
+    let swaps =
+        [(Preset::Default, "accumulate", &["history"][..]), (Preset::Reference, "reproject", &["guide", "signal"])];
     for (preset, kernel, pairs) in swaps {
         let case = lively(preset).case();
         let right = case.run(&mut Cpu::new());

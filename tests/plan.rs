@@ -9,7 +9,7 @@ use limpid::plan::{Grid, Stage};
 use limpid::resource::{Access, Kind};
 use limpid::settings::{Fallback, Pipeline, RayList};
 use limpid::synchronization::Usage;
-use limpid::{Camera, Denoiser, Error, FrameInputs, Plan, Preset, Settings};
+use limpid::{Camera, DebugView, Denoiser, Error, FrameInputs, Plan, Preset, Settings};
 use proptest::prelude::*;
 
 mod any_settings;
@@ -77,6 +77,7 @@ proptest! {
         let uses_average = is_published && (features.spatial_filter || features.history_clip || features.average_mixing);
         prop_assert_eq!(plan.resource("average").is_some(), uses_average);
         prop_assert_eq!(plan.resource("light").is_some(), !is_published && features.light_change);
+        prop_assert_eq!(plan.resource("debug_view").is_some(), features.debug_view.is_some());
         let spreads = usize::from(features.outlier_spread) + usize::from(features.spatial_filter && features.wide_filter);
         let planned = plan.passes.iter().filter(|pass| pass.kernel == "block_spread").count();
         prop_assert_eq!(planned, if is_published { 0 } else { spreads });
@@ -156,7 +157,11 @@ fn the_tracer_runs_between_the_stages() {
 
 #[test]
 fn kernels_are_all_used() {
-    let plans = Preset::ALL.iter().map(|(_, preset)| Plan::new(&preset.settings(), SIZE).unwrap().0);
+    let plans = Preset::ALL.iter().map(|(_, preset)| {
+        let mut settings = preset.settings();
+        settings.features.debug_view = Some(DebugView::HistoryLength);
+        Plan::new(&settings, SIZE).unwrap().0
+    });
     let planned: HashSet<_> = plans.flat_map(|plan| plan.passes).map(|pass| pass.kernel).collect();
     assert_eq!(planned, names().map(str::to_owned).collect());
     assert!(Kernel::new("no_such_kernel", &Overrides::new()).is_err());

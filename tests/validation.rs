@@ -5,7 +5,7 @@ use glam::UVec2;
 use limpid::plan::Plan;
 use limpid::resource::{Access, Copy};
 use limpid::settings::{Fallback, Pipeline, RayList};
-use limpid::{Denoiser, Preset, Settings};
+use limpid::{DebugView, Denoiser, Preset, Settings};
 use limpid_harness::executor::{Ash, AshOptions};
 use limpid_harness::strategy::noise;
 use limpid_harness::{Case, Change, Pixel, skip};
@@ -37,6 +37,7 @@ fn frames_sizes_and_settings_change_without_a_message() {
         case.steps[3].change = Change::Resize(UVec2::new(64, 33));
         let mut other = case.settings.clone();
         other.coverage.fallback = Fallback::Environment;
+        other.features.debug_view = Some(DebugView::Candidate);
         case.steps[5].change = Change::Settings(Box::new(other.clone()));
         other.footprint.filter_scale = 0.2;
         case.steps[6].change = Change::Settings(Box::new(other.clone()));
@@ -52,7 +53,8 @@ fn frames_sizes_and_settings_change_without_a_message() {
 
 #[test]
 fn a_frame_has_few_barriers_and_its_passes_have_times() {
-    for (preset, dispatches, barriers, descriptor_writes) in [(Preset::Default, 10, 10, 5), (Preset::Reference, 6, 6, 5)]
+    for (preset, dispatches, barriers, descriptor_writes) in
+        [(Preset::Default, 10, 10, 5), (Preset::Reference, 6, 6, 5)]
     {
         let Some(mut ash) = open(false, false) else { return };
         let mut case = Case::still(SIZE, 3, noisy);

@@ -9,6 +9,7 @@ pub mod bench;
 pub mod commands;
 pub mod cost;
 pub mod export;
+mod legend;
 pub mod metrics;
 pub mod picture;
 pub mod scene;

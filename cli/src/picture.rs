@@ -24,15 +24,32 @@ const GAP_WIDTH: u32 = 4;
 /// # Panics
 /// When `radiance` does not have `size.x * size.y` pixels.
 pub fn tone_map(radiance: &[[f32; 3]], size: UVec2, exposure: f32) -> RgbImage {
-    assert_eq!(radiance.len(), size.x as usize * size.y as usize, "image size must agree");
-    let encode = |x: f32| {
-        let exposed = f64::from(x * exposure).max(0.0).min(f64::from(f32::MAX));
-        (metrics::srgb_encode(metrics::tone_map(exposed)) * 255.0).round() as u8
-    };
+    encode(radiance, size, |x| metrics::tone_map(f64::from(x * exposure).max(0.0).min(f64::from(f32::MAX))))
+}
+
+/// Linear colours, 0 to 1, sRGB-encoded.
+///
+/// # Panics
+/// When `colors` does not have `size.x * size.y` pixels.
+pub fn display(colors: &[[f32; 3]], size: UVec2) -> RgbImage {
+    encode(colors, size, |x| f64::from(x).clamp(0.0, 1.0))
+}
+
+/// A linear colour, 0 to 1, sRGB-encoded.
+pub(crate) fn srgb(color: [f32; 3]) -> Rgb<u8> {
+    Rgb(color.map(|x| srgb_byte(f64::from(x))))
+}
+
+fn srgb_byte(linear: f64) -> u8 {
+    (metrics::srgb_encode(linear) * 255.0).round() as u8
+}
+
+fn encode(pixels: &[[f32; 3]], size: UVec2, shown: impl Fn(f32) -> f64) -> RgbImage {
+    assert_eq!(pixels.len(), size.x as usize * size.y as usize, "image size must agree");
     let mut picture = RgbImage::new(size.x, size.y);
-    for (pixel, rgb) in picture.pixels_mut().zip(radiance) {
+    for (pixel, rgb) in picture.pixels_mut().zip(pixels) {
         *pixel = match rgb.iter().all(|x| x.is_finite()) {
-            true => Rgb(rgb.map(encode)),
+            true => Rgb(rgb.map(|x| srgb_byte(shown(x)))),
             false => MAGENTA,
         };
     }

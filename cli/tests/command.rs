@@ -147,6 +147,43 @@ fn backends_can_be_chosen() {
 }
 
 #[test]
+fn debug_views_come_with_a_legend_and_change_nothing() {
+    let folder = Folder::new("views");
+    let (plain, out) = (folder.join("plain"), folder.join("out"));
+    demo(path(&plain), &[]);
+    demo(path(&out), &["--debug-view", "motion-error"]);
+    // Noisy, denoised, reference and the view, and the legend below.
+    let size = |folder: &Path| image::open(folder.join("comparison.png")).unwrap().into_rgb8().dimensions();
+    assert_eq!(size(&plain), (3 * 64 + 2 * 4, 36));
+    assert!(size(&out).0 >= 4 * 64 + 3 * 4 && size(&out).1 > 36 + 20);
+    for number in 0..4 {
+        let name = format!("denoised/frame_{number:04}.exr");
+        assert_eq!(fs::read(plain.join(&name)).unwrap(), fs::read(out.join(&name)).unwrap());
+    }
+    for backend in ["cpu", "auto", "ash"] {
+        if backend == "ash" && limpid_ash::offscreen::device_names().is_empty() {
+            limpid_harness::skip("no Vulkan device for --backend ash");
+            continue;
+        }
+        let shown = folder.join(backend);
+        let noisy = out.join("noisy");
+        let view = ["--debug-view", "history-length", "--backend", backend];
+        succeeds(&[&["denoise", path(&noisy), "--out", path(&shown)], &view[..]].concat());
+        let begins_anew = |number: u32| {
+            let picture = image::open(shown.join(format!("frame_{number:04}.png"))).unwrap().into_rgb8();
+            let view = image::imageops::crop_imm(&picture, 3 * (64 + 4), 0, 64, 36).to_image();
+            let is_red = |pixel: &&image::Rgb<u8>| pixel.0[0] > 200 && pixel.0[1] < 60 && pixel.0[2] < 60;
+            view.pixels().filter(is_red).count()
+        };
+        // All that is no sky in the first frame, hardly anything in the last.
+        assert!(begins_anew(0) > 1000 && begins_anew(3) < 300, "{backend}: {} {}", begins_anew(0), begins_anew(3));
+    }
+    fails(&["demo", "--debug-view", "nothing"], 2, &["nothing", "history-length", "candidate"]);
+    let without_motion = ["--features=-surface_motion", "--debug-view", "motion-error"];
+    fails(&[&["demo", "--out", path(&folder.join("no"))], &without_motion[..]].concat(), 1, &["surface_motion"]);
+}
+
+#[test]
 fn fewer_rays_cost_error() {
     let folder = Folder::new("rays");
     let mut psnr = Vec::new();

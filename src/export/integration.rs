@@ -4,10 +4,11 @@ use std::fmt::Write;
 
 use super::manifest::{BindingEntry, GridEntry, Manifest, OutputEntry, PassEntry, ResourceEntry, ResourceKind};
 use super::{Export, MANIFEST, Target};
-use crate::plan::Stage;
+use crate::plan::{DEBUG_VIEW, Stage};
 use crate::resource::{Copy, Lifetime};
 use crate::settings::{DepthEncoding, NormalEncoding, RoughnessEncoding};
 use crate::synchronization::{Barrier, Scope};
+use crate::{DebugView, Key};
 
 /// What is said of a language's API.
 struct Words {
@@ -80,6 +81,7 @@ impl Export<'_> {
         );
         page += &self.steps(&manifest, &words);
         page += &resource_table(&manifest, target);
+        page += &self.debug_view_legend();
         page += "## Passes\n\n";
         let _ = write!(page, "{} {}\n\n", words.bind, words.barrier);
         manifest.passes.iter().for_each(|pass| page += &pass_section(pass, target, &words));
@@ -115,6 +117,22 @@ impl Export<'_> {
         )
     }
 
+    fn debug_view_legend(&self) -> String {
+        let Some(legend) = self.settings.features.debug_view.map(DebugView::legend) else { return String::new() };
+        let mut section = format!(
+            "## Debug view\n\nThe texture `{DEBUG_VIEW}` shows in linear colours: {}. Read it between the denoise passes of this frame and the next.\n\n\
+             | red, green, blue | |\n|---|---|\n",
+            legend.title
+        );
+        for Key { color: [r, g, b], label } in legend.ramp.iter().chain(legend.keys) {
+            let _ = writeln!(section, "| {r}, {g}, {b} | {label} |");
+        }
+        if !legend.ramp.is_empty() {
+            let _ = writeln!(section, "\nThe first {} are mixed for what lies between.", legend.ramp.len());
+        }
+        section + "\n"
+    }
+
     fn chosen_conventions(&self) -> String {
         let conventions = &self.settings.conventions;
         let depth = match conventions.depth {
@@ -144,7 +162,9 @@ fn output_text(manifest: &Manifest) -> String {
     match copy {
         Copy::Current => format!("`{resource}`, which is also next frame's history"),
         Copy::Previous => {
-            format!("the previous copy of `{resource}`, so in another texture every frame; the current copy is next frame's history")
+            format!(
+                "the previous copy of `{resource}`, so in another texture every frame; the current copy is next frame's history"
+            )
         }
     }
 }

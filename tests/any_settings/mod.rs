@@ -1,7 +1,7 @@
 //! Settings that change code or bindings, at random.
 
-use limpid::Settings;
 use limpid::settings::{Channel, Fallback, NormalEncoding, Pipeline, RayList, RaysPerQuad, RoughnessEncoding};
+use limpid::{DebugView, Settings};
 use limpid_harness::strategy::any_features;
 use proptest::prelude::*;
 
@@ -15,10 +15,10 @@ pub(crate) fn any_settings() -> impl Strategy<Value = Settings> {
         prop::sample::select(vec![RoughnessEncoding::Perceptual, RoughnessEncoding::Alpha]),
         prop::sample::select(vec![Fallback::Black, Fallback::Input, Fallback::Environment]),
         ray_list,
-        any_features(),
+        (any_features(), prop::option::of(prop::sample::select(DebugView::ALL))),
         prop::sample::select(vec![Pipeline::Footprint, Pipeline::Published]),
     )
-        .prop_map(|(normal, channel, roughness, fallback, ray_list, features, pipeline)| {
+        .prop_map(|(normal, channel, roughness, fallback, ray_list, (features, view), pipeline)| {
             let mut settings = Settings::default();
             settings.pipeline = pipeline;
             settings.features = features;
@@ -32,6 +32,9 @@ pub(crate) fn any_settings() -> impl Strategy<Value = Settings> {
                 list.variance_threshold = variance_threshold;
                 list
             });
+            settings.features.debug_view = view.map(|(_, view)| view);
+            // Some views need a feature.
+            settings.features.debug_view = settings.features.debug_view.filter(|_| settings.validate().is_ok());
             settings
         })
 }

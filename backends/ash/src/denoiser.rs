@@ -3,7 +3,7 @@ use std::sync::Arc;
 use ash::vk;
 use glam::UVec2;
 use limpid::kernel::Binding;
-use limpid::plan::{Grid, Stage};
+use limpid::plan::{DEBUG_VIEW, Grid, Stage};
 use limpid::resource::Copy;
 use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
@@ -432,6 +432,13 @@ impl Denoiser {
     pub fn output(&self) -> OwnImage {
         let output = self.core.plan().output();
         output.and_then(|(name, copy)| self.intermediate_image(name, copy)).expect("every plan has an output")
+    }
+
+    /// The debug view, `R16G16B16A16_SFLOAT` in the layout `GENERAL`: linear colours, 0 to 1, as
+    /// [`limpid::DebugView::legend`] explains them. Visible to [`Options::reader_stages`] from the end of the recorded
+    /// frame until the next frame's commands, which wait for those stages. `None` unless the settings ask for one.
+    pub fn debug_view(&self) -> Option<OwnImage> {
+        self.intermediate_image(DEBUG_VIEW, Copy::Current)
     }
 
     /// The rays to trace, after [`record_classify`](Self::record_classify), visible to [`Options::reader_stages`].

@@ -2,7 +2,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::UVec2;
 use limpid::kernel::Kernel;
-use limpid::plan::{Bound, Grid, Pass, Stage};
+use limpid::plan::{Bound, DEBUG_VIEW, Grid, Pass, Stage};
 use limpid::resource::{Copy, Format, Kind};
 use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
@@ -304,6 +304,12 @@ impl Denoiser {
     pub fn output(&self) -> &Texture {
         let output = self.core.plan().output();
         output.and_then(|(name, copy)| self.intermediate_texture(name, copy)).expect("every plan has an output")
+    }
+
+    /// The debug view of the last frame: linear colours, 0 to 1, as [`limpid::DebugView::legend`] explains them. `None`
+    /// unless the settings ask for one.
+    pub fn debug_view(&self) -> Option<&Texture> {
+        self.intermediate_texture(DEBUG_VIEW, Copy::Current)
     }
 
     /// A texture of the plan as it is after the last frame.

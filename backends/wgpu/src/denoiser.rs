@@ -1,5 +1,5 @@
 use glam::UVec2;
-use limpid::plan::{Bound, Grid, Stage};
+use limpid::plan::{Bound, DEBUG_VIEW, Grid, Stage};
 use limpid::resource::Copy;
 use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
@@ -309,8 +309,25 @@ impl Denoiser {
 
     fn output_pair(&self) -> &(wgpu::Texture, wgpu::TextureView) {
         let plan = self.core.plan();
-        let output = plan.output().and_then(|(name, copy)| self.allocations.texture(plan, name, copy, self.core.phase()));
+        let output =
+            plan.output().and_then(|(name, copy)| self.allocations.texture(plan, name, copy, self.core.phase()));
         output.expect("every plan has an output")
+    }
+
+    /// The debug view of the frame recorded last, `Rgba16Float`: linear colours, 0 to 1, as
+    /// [`limpid::DebugView::legend`] explains them. Read it before the next frame's denoise stage runs. `None` unless
+    /// the settings ask for one.
+    pub fn debug_view(&self) -> Option<&wgpu::TextureView> {
+        self.debug_view_pair().map(|(_, view)| view)
+    }
+
+    /// The texture of [`debug_view`](Self::debug_view), to copy from.
+    pub fn debug_view_texture(&self) -> Option<&wgpu::Texture> {
+        self.debug_view_pair().map(|(texture, _)| texture)
+    }
+
+    fn debug_view_pair(&self) -> Option<&(wgpu::Texture, wgpu::TextureView)> {
+        self.allocations.texture(self.core.plan(), DEBUG_VIEW, Copy::Current, self.core.phase())
     }
 
     /// The rays to trace, after [`encode_classify`](Self::encode_classify). `None` unless the settings ask for

@@ -50,8 +50,8 @@ fn radiance_texture(size: UVec2, radiance: &[[f32; 4]]) -> Texture {
     texture
 }
 
-/// Radiance and variance.
-fn output(texture: &Texture, size: UVec2) -> (Vec<[f32; 3]>, Vec<f32>) {
+/// The first three channels and the fourth.
+fn read_halves(texture: &Texture, size: UVec2) -> (Vec<[f32; 3]>, Vec<f32>) {
     let words = texture.read();
     let row = texture.size()[0] as usize * 2;
     let rows = words.chunks_exact(row).take(size.y as usize);
@@ -96,7 +96,8 @@ impl Backend for Cpu {
         }
         let inputs = Inputs { radiance: &radiance, normal, roughness, depth, motion, environment: None };
         timed(&mut time, &mut cpu_time, || self.denoiser.run_denoise(&inputs))?;
-        let (radiance, variance) = output(self.denoiser.output(), size);
-        Ok(Denoised { radiance, variance, time, cpu_time, pass_times: Vec::new(), rays, traced })
+        let (radiance, variance) = read_halves(self.denoiser.output(), size);
+        let debug_view = self.denoiser.debug_view().map(|texture| read_halves(texture, size).0);
+        Ok(Denoised { radiance, variance, debug_view, time, cpu_time, pass_times: Vec::new(), rays, traced })
     }
 }

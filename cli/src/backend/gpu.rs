@@ -203,13 +203,14 @@ impl Gpu {
         Ok(words.into_iter().take(count[0] as usize).map(ListedRay::unpack).collect())
     }
 
-    fn read_output(&self, size: UVec2) -> Result<(Vec<[f32; 3]>, Vec<f32>)> {
+    /// The first three channels and the fourth.
+    fn read_halves(&self, texture: &wgpu::Texture, size: UVec2) -> Result<(Vec<[f32; 3]>, Vec<f32>)> {
         let mut encoder = self.encoder();
         let row = (size.x * 8).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = self.readback_buffer(u64::from(row) * u64::from(size.y));
         let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row), rows_per_image: None };
         encoder.copy_texture_to_buffer(
-            self.denoiser.output_texture().as_image_copy(),
+            texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
             wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
         );
@@ -265,7 +266,10 @@ impl Backend for Gpu {
         }
         self.denoiser.encode_denoise(&mut encoder, &self.images.inputs())?;
         self.run(encoder, &mut time, &mut cpu_time)?;
-        let (radiance, variance) = self.read_output(frame.size)?;
-        Ok(Denoised { radiance, variance, time, cpu_time, pass_times: self.read_times()?, rays, traced })
+        let (radiance, variance) = self.read_halves(self.denoiser.output_texture(), frame.size)?;
+        let view = self.denoiser.debug_view_texture();
+        let debug_view = view.map(|texture| anyhow::Ok(self.read_halves(texture, frame.size)?.0)).transpose()?;
+        let pass_times = self.read_times()?;
+        Ok(Denoised { radiance, variance, debug_view, time, cpu_time, pass_times, rays, traced })
     }
 }

@@ -24,6 +24,8 @@ pub struct Denoised {
     pub radiance: Vec<[f32; 3]>,
     /// Temporal variance, 0 to 1, row by row.
     pub variance: Vec<f32>,
+    /// Linear colours of the debug view, 0 to 1, row by row, where the settings ask for one.
+    pub debug_view: Option<Vec<[f32; 3]>>,
     /// From submission until the device was done, uploads and read-back excluded.
     pub time: Duration,
     /// Time that all processors together spent on it, for devices that are processors.

@@ -9,7 +9,7 @@ use half::f16;
 use limpid::{FrameInputs, Plan};
 use limpid_ash::ash::vk::Format;
 use limpid_ash::offscreen::{Context, ContextOptions, Session, UploadedImage, UploadedInputs};
-use limpid_ash::{Denoiser, Options};
+use limpid_ash::{Denoiser, Options, OwnImage};
 
 use super::{Backend, Denoised, ListedRay, Tracer, split, timed, to_half, trace_listed};
 use crate::sequence::Frame;
@@ -55,10 +55,10 @@ fn listed_rays(context: &Context, denoiser: &Denoiser) -> Result<Vec<ListedRay>>
     Ok(words.into_iter().take(count).map(ListedRay::unpack).collect())
 }
 
-fn read_output(context: &Context, denoiser: &Denoiser, size: UVec2) -> Result<(Vec<[f32; 3]>, Vec<f32>)> {
-    let output = denoiser.output();
-    let halves: Vec<[f16; 4]> = bytemuck::pod_collect_to_vec(&context.read_image(&output)?);
-    let rows = halves.chunks_exact(output.size.x as usize).take(size.y as usize);
+/// The first three channels and the fourth.
+fn read_halves(context: &Context, image: &OwnImage, size: UVec2) -> Result<(Vec<[f32; 3]>, Vec<f32>)> {
+    let halves: Vec<[f16; 4]> = bytemuck::pod_collect_to_vec(&context.read_image(image)?);
+    let rows = halves.chunks_exact(image.size.x as usize).take(size.y as usize);
     Ok(split(rows.flat_map(|row| &row[..size.x as usize]).copied()))
 }
 
@@ -101,7 +101,9 @@ impl Backend for Vulkan {
         }
         let pass_times = session.denoiser().read_times()?.unwrap_or_default();
         let pass_times = pass_times.into_iter().map(|time| (time.pass, time.duration)).collect();
-        let (radiance, variance) = read_output(context, session.denoiser(), size)?;
-        Ok(Denoised { radiance, variance, time, cpu_time, pass_times, rays, traced })
+        let (radiance, variance) = read_halves(context, &session.denoiser().output(), size)?;
+        let view = session.denoiser().debug_view();
+        let debug_view = view.map(|image| anyhow::Ok(read_halves(context, &image, size)?.0)).transpose()?;
+        Ok(Denoised { radiance, variance, debug_view, time, cpu_time, pass_times, rays, traced })
     }
 }

@@ -7,13 +7,16 @@ use clap::Args;
 use glam::UVec2;
 use image::RgbImage;
 use indicatif::{ProgressBar, ProgressStyle};
+use limpid::DebugView;
 use limpid::settings::{RayList, RaysPerQuad};
 
+use super::debug_view::DebugViewOptions;
 use super::denoise::{check_outputs, comparison, create_dir, write_png};
 use super::parse_size;
 use super::report::Recorder;
 use super::settings::SettingsOptions;
 use crate::backend::{self, Choice};
+use crate::legend::with_legend;
 use crate::picture;
 use crate::scene::{self, Scene};
 use crate::sequence::{self, Frame, Metadata};
@@ -50,6 +53,8 @@ pub(super) struct Demo {
     out: PathBuf,
     #[command(flatten)]
     settings: SettingsOptions,
+    #[command(flatten)]
+    debug_view: DebugViewOptions,
     /// What to run on.
     #[arg(long, value_enum, default_value_t)]
     backend: Choice,
@@ -141,6 +146,7 @@ impl Demo {
             bail!("--rays-per-quad is 3, expected 1, 2 or 4");
         }
         let mut settings = self.settings.load()?;
+        self.debug_view.apply(&mut settings);
         if let Some(list) = self.ray_list() {
             settings.coverage.ray_list = Some(list);
         }
@@ -173,22 +179,23 @@ impl Demo {
             let path = self.out.join("denoised").join(file_name(frame.number));
             sequence::write_exr(&path, frame.size, &denoised.radiance, &Metadata::new(frame.size))?;
             recorder.add(frame, &denoised);
-            pictures.push(comparison(frame, &denoised.radiance, exposure));
+            pictures.push(comparison(frame, &denoised, exposure));
         }
         sequence::write_sequence(&self.out.join("noisy"), scene.name, exposure, &frames)?;
-        self.write_pictures(&pictures)?;
+        self.write_pictures(&pictures, settings.features.debug_view)?;
         recorder.finish(scene.name.to_owned(), backend.as_ref()).print(self.json)?;
         eprintln!("wrote {}", self.out.join("animation.png").display());
         Ok(())
     }
 
-    fn write_pictures(&self, pictures: &[RgbImage]) -> Result<()> {
-        write_animation(&self.out.join("animation.png"), pictures)?;
-        if let Some(last) = pictures.last() {
+    fn write_pictures(&self, pictures: &[RgbImage], view: Option<DebugView>) -> Result<()> {
+        let explained: Vec<_> = pictures.iter().map(|picture| with_legend(picture, view)).collect();
+        write_animation(&self.out.join("animation.png"), &explained)?;
+        if let Some(last) = explained.last() {
             write_png(&self.out.join("comparison.png"), last)?;
         }
         let step = pictures.len().div_ceil(STRIP_ROWS);
         let rows: Vec<_> = pictures.iter().step_by(step).cloned().collect();
-        write_png(&self.out.join("strip.png"), &picture::film_strip(&rows, 1))
+        write_png(&self.out.join("strip.png"), &with_legend(&picture::film_strip(&rows, 1), view))
     }
 }

@@ -7,9 +7,11 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use indicatif::ProgressBar;
 
+use super::debug_view::DebugViewOptions;
 use super::report::{Recorder, noisy_radiance};
 use super::settings::SettingsOptions;
-use crate::backend::{self, Choice};
+use crate::backend::{self, Choice, Denoised};
+use crate::legend::with_legend;
 use crate::picture;
 use crate::sequence::{self, ChannelNames, Frame, Metadata, Sequence};
 
@@ -26,6 +28,8 @@ pub(super) struct Denoise {
     out: PathBuf,
     #[command(flatten)]
     settings: SettingsOptions,
+    #[command(flatten)]
+    debug_view: DebugViewOptions,
     /// Channel of the EXR files for an input, such as depth=ViewLayer.Depth.Z. Inputs are radiance,
     /// hit_distance, normal, roughness, depth, motion and reference; a name stands for all channels that
     /// begin with it, a comma separates exact names. Can be given more than once.
@@ -69,14 +73,13 @@ pub(super) fn create_dir(path: &Path) -> Result<()> {
     fs::create_dir_all(path).with_context(|| format!("cannot create the folder {}", path.display()))
 }
 
-/// Noisy, denoised and, if there is one, the reference, side by side.
-pub(super) fn comparison(frame: &Frame, denoised: &[[f32; 3]], exposure: f32) -> image::RgbImage {
+/// Noisy, denoised and, if there are such, the reference and the debug view, side by side.
+pub(super) fn comparison(frame: &Frame, denoised: &Denoised, exposure: f32) -> image::RgbImage {
     let noisy = noisy_radiance(frame);
-    let reference = frame.reference.as_deref();
-    let images = [Some(noisy.as_slice()), Some(denoised), reference];
-    let pictures: Vec<_> =
-        images.into_iter().flatten().map(|image| picture::tone_map(image, frame.size, exposure)).collect();
-    picture::side_by_side(&pictures)
+    let images = [Some(&noisy), Some(&denoised.radiance), frame.reference.as_ref()];
+    let pictures = images.into_iter().flatten().map(|image| picture::tone_map(image, frame.size, exposure));
+    let debug_view = denoised.debug_view.iter().map(|colors| picture::display(colors, frame.size));
+    picture::side_by_side(&pictures.chain(debug_view).collect::<Vec<_>>())
 }
 
 /// Writes a picture.
@@ -106,11 +109,14 @@ impl Denoise {
     }
 
     pub(super) fn run(&self) -> Result<()> {
-        let settings = self.settings.load()?;
+        let mut settings = self.settings.load()?;
+        self.debug_view.apply(&mut settings);
+        let view = settings.features.debug_view;
+        let writes_png = self.png || view.is_some();
         let channels = ChannelNames::parse(&self.channel)?;
         let sequence = Sequence::open(&self.sequence, &channels)?;
         let outputs = self.outputs(&sequence)?;
-        let pictures = outputs.iter().filter(|_| self.png).map(|(_, png)| png.as_path());
+        let pictures = outputs.iter().filter(|_| writes_png).map(|(_, png)| png.as_path());
         check_outputs(outputs.iter().map(|(exr, _)| exr.as_path()).chain(pictures), self.force)?;
         let exposure = self.exposure.unwrap_or(sequence.exposure());
 
@@ -130,8 +136,8 @@ impl Denoise {
             let denoised = backend.denoise(&frame, exposure, None)?;
             let metadata: Metadata = sequence.metadata(index)?;
             sequence::write_exr(exr, frame.size, &denoised.radiance, &metadata)?;
-            if self.png {
-                write_png(png, &comparison(&frame, &denoised.radiance, exposure))?;
+            if writes_png {
+                write_png(png, &with_legend(&comparison(&frame, &denoised, exposure), view))?;
             }
             recorder.add(&frame, &denoised);
             progress.inc(1);

@@ -3,6 +3,7 @@
 mod analyze;
 mod bench;
 mod cost;
+mod debug_view;
 mod demo;
 mod denoise;
 mod export;

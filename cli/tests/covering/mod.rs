@@ -2,7 +2,7 @@
 
 use glam::UVec2;
 use limpid::settings::{Fallback, NormalEncoding, Pipeline, RayList, RaysPerQuad, RoughnessEncoding};
-use limpid::{Plan, Preset, Settings};
+use limpid::{DebugView, Plan, Preset, Settings};
 use limpid_harness::strategy::any_features;
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::TestRunner;
@@ -53,10 +53,25 @@ fn mixed() -> Vec<Settings> {
     vec![mirrored, sparse, paired, footprints]
 }
 
-/// Every preset, every preset with each feature turned, and mixtures.
+/// Debug views that look for history again, and others.
+fn with_views() -> impl Iterator<Item = (String, Settings)> {
+    let views = [
+        (Preset::Default, DebugView::Candidate),
+        (Preset::Reference, DebugView::Candidate),
+        (Preset::Default, DebugView::TileClasses),
+        (Preset::Reference, DebugView::MotionError),
+    ];
+    views.into_iter().map(|(preset, view)| {
+        let mut settings = preset.settings();
+        settings.features.debug_view = Some(view);
+        (format!("{preset:?} with {view:?}"), settings)
+    })
+}
+
+/// Every preset, every preset with each feature turned, debug views, and mixtures.
 pub(crate) fn covering_settings() -> Vec<(String, Settings)> {
     let presets = Preset::ALL.iter().map(|(name, preset)| (name.to_string(), preset.settings()));
     let toggled = presets.clone().flat_map(|(name, settings)| toggled(&name, &settings));
     let mixed = mixed().into_iter().enumerate().map(|(number, settings)| (format!("mixture {number}"), settings));
-    presets.chain(toggled).chain(mixed).collect()
+    presets.chain(toggled).chain(with_views()).chain(mixed).collect()
 }

@@ -110,7 +110,8 @@ impl Table {
             let others = &b.0[name];
             assert_eq!(words.len(), others.len(), "{name}");
             let accumulated = Accumulated::ALL.iter().find(|accumulated| accumulated.resource == name);
-            let is_halves = accumulated.is_some() || matches!(name.as_str(), "previous signal" | "average" | "output");
+            let is_halves = accumulated.is_some()
+                || matches!(name.as_str(), "previous signal" | "average" | "output" | "debug_view");
             for (index, (&word, &other)) in words.iter().zip(others).enumerate() {
                 // Where nothing is denoised it holds what was there before.
                 if accumulated.is_some() && !(is_denoised(a, index / 2) && is_denoised(b, index / 2)) {

@@ -21,7 +21,8 @@ impl Snapshot {
             let name = resource.name.as_str();
             match resource.kind {
                 Kind::Texture { .. } => {
-                    let copies = if resource.ping_pong { &[Copy::Current, Copy::Previous][..] } else { &[Copy::Current] };
+                    let copies =
+                        if resource.ping_pong { &[Copy::Current, Copy::Previous][..] } else { &[Copy::Current] };
                     for &copy in copies {
                         let key = match copy {
                             _ if plan.output() == Some((name, copy)) => "output".to_owned(),
@@ -68,8 +69,13 @@ impl Snapshot {
 
     /// The denoised image: radiance and variance of each texel.
     pub fn output(&self) -> Vec<[f32; 4]> {
+        self.half_texels("output")
+    }
+
+    /// Texels of a resource of four half floats.
+    pub fn half_texels(&self, name: &str) -> Vec<[f32; 4]> {
         let half = |bits: u32| f16::from_bits(bits as u16).to_f32();
         let texel = |w: &[u32]| [half(w[0]), half(w[0] >> 16), half(w[1]), half(w[1] >> 16)];
-        self.0["output"].chunks_exact(2).map(texel).collect()
+        self.0[name].chunks_exact(2).map(texel).collect()
     }
 }
