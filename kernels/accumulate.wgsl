@@ -193,7 +193,9 @@ fn clipped(history: vec3<f32>, own: vec3<f32>, pixel: vec2<u32>, roughness: f32)
     let weight = MIRROR_WEIGHT * (1.0 - smoothstep(0.0, MIRROR_UP_TO, roughness));
     var sum = squeezed(own) * weight;
     var squares = sum * squeezed(own);
-    for (var i = 0; i < 9; i++) {
+    // Rougher surfaces are not clipped.
+    let count = select(0, 9, roughness < frame.accumulate_clip_roughness);
+    for (var i = 0; i < count; i++) {
         let at = clamp(vec2<i32>(pixel) + vec2<i32>(i % 3, i / 3) - 1, vec2<i32>(0), vec2<i32>(frame.size) - 1);
         let c = squeezed(load_radiance(vec2<u32>(at)));
         sum += c;

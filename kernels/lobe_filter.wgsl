@@ -109,10 +109,13 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let reach = clamp(radius, vec2<f32>(NEAR_LEAST), vec2<f32>(NEAR_MOST)) * inverseSqrt(max(f32(NEAR_TAPS), 1.0));
     let falloff = 1.0 / max(radius, vec2<f32>(NEAR_LEAST));
     var direction = vec2<f32>(1.0, 0.0);
+    let by_blocks = smoothstep(WIDE_FROM, WIDE_TO, radius.x) * smoothstep(0.0, 0.3, wide.fit);
+    // Where blocks decide alone, taps would count for nothing.
+    let taps = select(NEAR_TAPS, 0u, by_blocks >= 1.0);
     // a: weight.
     var sum = vec4<f32>(0.0);
     var brightest = 0.0;
-    for (var i = 0u; i < NEAR_TAPS; i++) {
+    for (var i = 0u; i < taps; i++) {
         let point = direction * (reach * sqrt(f32(i) + 0.5));
         direction = turned(direction);
         let offset = round(footprint.axis * point.x + side * point.y);
@@ -138,7 +141,6 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let alone = select(1.0, limit, brightest > 0.0 && guide.roughness >= OUTLIER_ROUGHNESS);
     sum += vec4<f32>(own_radiance * alone, 1.0) * trust(own.length);
     let near = sum.rgb / sum.a;
-    let by_blocks = smoothstep(WIDE_FROM, WIDE_TO, radius.x) * smoothstep(0.0, 0.3, wide.fit);
     return vec4<f32>(blend(near, wide.radiance, by_blocks), wide.variance);
 }
 
