@@ -3,10 +3,11 @@
 
 use std::fmt;
 
-use glam::{Mat3, Mat4, UVec2, Vec2, Vec3, Vec4};
+use glam::{Mat3, Mat4, UVec2, Vec2, Vec3};
 use limpid::Camera;
 use serde::Serialize;
 
+use super::conform::FLIPPED;
 use super::percent;
 use crate::sequence::Frame;
 
@@ -62,6 +63,18 @@ const NORMALS: [NormalMeaning; 5] = [
     NormalMeaning::Inward,
 ];
 
+/// Whose view matrices those of `camera.json` are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MatrixTiming {
+    /// Of their own frame.
+    Own,
+    /// Of the frame before.
+    FrameBefore,
+    /// Of the frame after.
+    FrameAfter,
+}
+
 /// How well depth and normals fit each other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Geometry {
@@ -75,6 +88,11 @@ pub struct Geometry {
     pub best_agreement: f64,
     /// Whether clip space looks as if it had `y` down.
     pub y_down: bool,
+    /// Whose view matrices turn normals of the depth into those that are stored.
+    pub matrices: MatrixTiming,
+    /// Median angle between both with the matrices of the own frame, the frame before and the frame after, in
+    /// radians; only where the camera turns.
+    pub angles: Option<[f64; 3]>,
 }
 
 /// Cosine from which two normals agree: bumps and curved surfaces are allowed for.
@@ -88,6 +106,10 @@ pub(super) struct Gatherer {
     agreeing: [[usize; NORMALS.len()]; DEPTHS.len()],
     /// With `y` of clip space the other way.
     agreeing_y_down: usize,
+    /// Stored normal in world space and that of the depth in view space, of the last frame, with its matrix.
+    last: Option<(Mat3, Vec<[Vec3; 2]>)>,
+    /// Distances between stored normals and those of the depth, in the order of `MatrixTiming`.
+    distances: [Vec<f32>; 3],
 }
 
 /// Position in view space of a pixel with a depth, `None` if there is none.
@@ -113,9 +135,6 @@ pub(super) fn view_position(
     }
 }
 
-/// Turns `y` of clip space around.
-const FLIPPED: Mat4 = Mat4::from_cols(Vec4::X, Vec4::NEG_Y, Vec4::Z, Vec4::W);
-
 /// Normal in view space, towards the camera, of the surface through a pixel's place and those right of and below it.
 /// `None` across an edge, where there is no surface.
 fn surface_normal([center, right, below]: [Vec3; 3]) -> Option<Vec3> {
@@ -132,6 +151,7 @@ impl Gatherer {
         let size = frame.size;
         let inverse_projection = frame.camera.view_to_clip.inverse();
         let view_to_world = Mat3::from_mat4(frame.camera.world_to_view).transpose();
+        let mut pairs = Vec::new();
         let rows = (1..size.y.saturating_sub(1)).step_by(STRIDE);
         for pixel in rows.flat_map(|y| (1..size.x.saturating_sub(1)).step_by(STRIDE).map(move |x| UVec2::new(x, y))) {
             let at = |dx: u32, dy: u32| ((pixel.y + dy) * size.x + pixel.x + dx) as usize;
@@ -160,12 +180,47 @@ impl Gatherer {
                     self.agreeing[d][n] += usize::from(agrees(*candidate, normal));
                 }
             }
+            pairs.extend(surface(DepthMeaning::Linear, &inverse_projection).map(|normal| [candidates[0], normal]));
             let y_down = surface(DepthMeaning::Linear, &(inverse_projection * FLIPPED));
             self.agreeing_y_down += usize::from(y_down.is_some_and(|normal| agrees(candidates[0], normal)));
         }
+        self.add_timing(frame.reset, view_to_world, pairs);
     }
 
-    pub(super) fn finish(self) -> Geometry {
+    /// With matrices that come a frame late, this frame's are those of the images before, and the other way round.
+    fn add_timing(&mut self, reset: bool, matrix: Mat3, pairs: Vec<[Vec3; 2]>) {
+        if let Some((last_matrix, last)) = self.last.take().filter(|(last, _)| !reset && *last != matrix) {
+            let distances = |matrix: Mat3, pairs: &[[Vec3; 2]]| -> Vec<f32> {
+                pairs.iter().map(|[stored, surface]| stored.distance(matrix * *surface)).collect()
+            };
+            self.distances[0].extend(distances(matrix, &pairs));
+            self.distances[1].extend(distances(matrix, &last));
+            self.distances[2].extend(distances(last_matrix, &pairs));
+        }
+        self.last = Some((matrix, pairs));
+    }
+
+    /// Median angles, and whose matrices fit clearly best.
+    fn timing(&mut self) -> (Option<[f64; 3]>, MatrixTiming) {
+        let median = |values: &mut Vec<f32>| {
+            values.sort_by(f32::total_cmp);
+            values.get(values.len() / 2).map(|&value| f64::from(value))
+        };
+        let [Some(own), Some(before), Some(after)] = self.distances.each_mut().map(median) else {
+            return (None, MatrixTiming::Own);
+        };
+        // Below a tenth of a degree angles are those of rounding.
+        let fits = |angle: f64, other: f64| own > 2e-3 && angle < 0.4 * own && angle < other;
+        let timing = match (fits(before, after), fits(after, before)) {
+            (true, _) => MatrixTiming::FrameBefore,
+            (_, true) => MatrixTiming::FrameAfter,
+            _ => MatrixTiming::Own,
+        };
+        (Some([own, before, after]), timing)
+    }
+
+    pub(super) fn finish(mut self) -> Geometry {
+        let (angles, timing) = self.timing();
         // Of all samples, so that a meaning does not win by making an edge of everything.
         let agreement = |d: usize, n: usize| self.agreeing[d][n] as f64 / self.samples.max(1) as f64;
         let (mut best, mut best_agreement) = (EXPECTED, agreement(0, 0));
@@ -182,7 +237,8 @@ impl Gatherer {
         if y_down {
             (best, best_agreement) = (EXPECTED, y_down_agreement);
         }
-        Geometry { samples: self.samples, agreement: agreement(0, 0), best, best_agreement, y_down }
+        let matrices = if best == EXPECTED && !y_down { timing } else { MatrixTiming::Own };
+        Geometry { samples: self.samples, agreement: agreement(0, 0), best, best_agreement, y_down, matrices, angles }
     }
 }
 

@@ -5,7 +5,6 @@ use std::fmt;
 
 use glam::{DVec3, Mat4, UVec2, Vec2, Vec3};
 use limpid::Camera;
-use limpid::settings::Conventions;
 use serde::Serialize;
 
 use super::geometry::{DepthMeaning, view_position};
@@ -41,12 +40,16 @@ pub struct Motion {
     pub camera_residual: Option<f64>,
     /// What the matrices mean if that fits better.
     pub camera: CameraMeaning,
+    /// Whether any camera differs from the one before, cuts aside.
+    pub camera_moves: bool,
     /// Surfaces that move by more than a pixel beyond what the camera does.
     pub object_motion: f64,
     /// Whether cameras are jittered.
     pub has_jitter: bool,
     /// Whether motion vectors contain the difference of the jitter.
     pub includes_jitter: bool,
+    /// Frames that begin anew, marked as reset, but for the first.
+    pub cuts: Vec<u32>,
     /// Frames that continue nothing and are not marked as reset.
     pub unmarked_cuts: Vec<u32>,
     /// Frames that are marked as reset and continue the one before.
@@ -80,6 +83,7 @@ pub(super) struct Gatherer {
     has_jitter: bool,
     camera_moves: bool,
     object_motion: usize,
+    cuts: Vec<u32>,
     unmarked_cuts: Vec<u32>,
     needless_resets: Vec<u32>,
 }
@@ -91,13 +95,13 @@ struct Sample {
     motion: Vec2,
 }
 
-fn samples(frame: &Frame, conventions: &Conventions) -> Vec<Sample> {
+fn samples(frame: &Frame) -> Vec<Sample> {
     let stride = ((frame.size.element_product() / SAMPLES) as f32).sqrt().max(1.0) as u32;
     let mut samples = Vec::new();
     for y in (stride / 2..frame.size.y).step_by(stride as usize) {
         for x in (stride / 2..frame.size.x).step_by(stride as usize) {
             let i = (y * frame.size.x + x) as usize;
-            let motion = Vec2::from(frame.motion[i]) * conventions.motion_scale;
+            let motion = Vec2::from(frame.motion[i]);
             if frame.depth[i].is_finite() && frame.depth[i] > 0.0 && motion.is_finite() {
                 let pixel = UVec2::new(x, y);
                 samples.push(Sample { pixel, uv: (pixel.as_vec2() + 0.5) / frame.size.as_vec2(), motion });
@@ -174,13 +178,14 @@ impl Gatherer {
             has_jitter: false,
             camera_moves: false,
             object_motion: 0,
+            cuts: Vec::new(),
             unmarked_cuts: Vec::new(),
             needless_resets: Vec::new(),
         }
     }
 
-    pub(super) fn add(&mut self, previous: &Frame, frame: &Frame, conventions: &Conventions) {
-        let samples = samples(frame, conventions);
+    pub(super) fn add(&mut self, previous: &Frame, frame: &Frame) {
+        let samples = samples(frame);
         let inverse_projections = [frame.camera.view_to_clip.inverse(), previous.camera.view_to_clip.inverse()];
         let [now, before] = &inverse_projections;
         let jitter = (frame.camera.jitter - previous.camera.jitter) / frame.size.as_vec2();
@@ -192,6 +197,9 @@ impl Gatherer {
             self.factors.iter().map(|&factor| samples.iter().map(|sample| look_up(sample, factor)).collect()).collect();
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
         let best = mismatches.iter().map(|values| mean(values)).fold(f64::INFINITY, f64::min);
+        if frame.reset {
+            self.cuts.push(frame.number);
+        }
         // Whatever the convention, nothing fits.
         let is_cut = samples.len() > 50 && best > 0.75;
         match (is_cut, frame.reset) {
@@ -266,6 +274,8 @@ impl Gatherer {
             has_jitter: self.has_jitter,
             includes_jitter: self.has_jitter
                 && expected.zip(jittered).is_some_and(|(plain, jittered)| jittered < 0.5 * plain),
+            camera_moves: self.camera_moves,
+            cuts: self.cuts,
             unmarked_cuts: self.unmarked_cuts,
             needless_resets: self.needless_resets,
         }
@@ -279,9 +289,14 @@ impl fmt::Display for Motion {
         }
         let (moving, objects) = (percent(self.moving), percent(self.object_motion));
         writeln!(f, "  motion       {moving} of surfaces move, {objects} not just with the camera")?;
+        let camera = if self.camera_moves { "moves" } else { "rests" };
+        let jitter = if self.has_jitter { "with jitter" } else { "without jitter" };
+        let cuts: Vec<_> = self.cuts.iter().map(u32::to_string).collect();
+        let cuts = if cuts.is_empty() { "no cuts".to_owned() } else { format!("cuts at {}", cuts.join(", ")) };
+        writeln!(f, "  camera       {camera}, {jitter}, {cuts}")?;
         writeln!(f, "  history      {} of surfaces are found where motion vectors lead", percent(1.0 - self.mismatch))?;
         if let Some(residual) = self.camera_residual {
-            writeln!(f, "  cameras      {residual:.2} pixels from the motion vectors, at the median")?;
+            writeln!(f, "               {residual:.2} pixels from the motion vectors, at the median")?;
         }
         Ok(())
     }
