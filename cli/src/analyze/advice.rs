@@ -66,19 +66,29 @@ fn geometry_findings(geometry: &Geometry) -> Vec<Finding> {
             ),
             NormalMeaning::Inward => ("normals that point into the surface", "negate them"),
         };
-        let found = format!("normals look like {what}: then {best} fit the surface, as they are {share}");
+        // Shares are of normals that fit roughly.
+        let fit = match geometry.best_agreement > geometry.agreement + 0.02 {
+            true => format!("then {best} fit the surface, as they are {share}"),
+            false => {
+                let [other, own] = [geometry.apart.view, geometry.apart.own].map(f64::to_degrees);
+                format!("then they are off by {other:.2} degrees at the median, as they are by {own:.2}")
+            }
+        };
+        let found = format!("normals look like {what}: {fit}");
         all.push(finding(Severity::Error, found, advice));
     }
-    let [own, before, after] = geometry.angles.unwrap_or_default().map(f64::to_degrees);
-    let (whose, other) = match geometry.matrices {
-        MatrixTiming::Own => ("", own),
-        MatrixTiming::FrameBefore => ("before", before),
-        MatrixTiming::FrameAfter => ("after", after),
+    let apart = geometry.apart;
+    let timing = match geometry.matrices {
+        MatrixTiming::Own => None,
+        MatrixTiming::FrameBefore => apart.before.map(|angle| ("before", angle)),
+        MatrixTiming::FrameAfter => apart.after.map(|angle| ("after", angle)),
     };
-    if geometry.matrices != MatrixTiming::Own {
+    if let Some((whose, angle)) = timing {
         let found = format!(
-            "the view matrices look like those of the frame {whose}: then normals are off by {other:.2} degrees at the \
-             median, as they are by {own:.2}"
+            "the view matrices look like those of the frame {whose}: then normals are off by {:.2} degrees at the \
+             median, as they are by {:.2}",
+            angle.to_degrees(),
+            apart.own.to_degrees()
         );
         all.push(finding(Severity::Error, found, "write the matrices that the frame's own images were rendered with"));
     }
@@ -92,7 +102,7 @@ fn geometry_findings(geometry: &Geometry) -> Vec<Finding> {
 
 fn motion_findings(motion: &Motion, conventions: &Conventions) -> Vec<Finding> {
     let mut all = Vec::new();
-    let (as_is, best) = (percent(1.0 - motion.mismatch), percent(1.0 - motion.best_mismatch));
+    let as_is = percent(1.0 - motion.mismatch);
     if motion.best_factor != glam::Vec2::ONE {
         let scale = motion.best_factor * conventions.motion_scale;
         let why = if motion.best_factor.abs().max_element() < 0.2 {
@@ -105,8 +115,11 @@ fn motion_findings(motion: &Motion, conventions: &Conventions) -> Vec<Finding> {
             "they look like normalised device coordinates"
         };
         let found = format!(
-            "motion vectors lead to the same surface for {as_is} of pixels; times ({}, {}) for {best}: {why}",
-            motion.best_factor.x, motion.best_factor.y
+            "motion vectors lead to the same surface for {} of what moves; times ({}, {}) for {}: {why}",
+            percent(1.0 - motion.moving_mismatch),
+            motion.best_factor.x,
+            motion.best_factor.y,
+            percent(1.0 - motion.best_mismatch)
         );
         let advice = format!("set conventions.motion_scale to [{}, {}]", scale.x, scale.y);
         all.push(finding(Severity::Error, found, advice));
@@ -181,13 +194,12 @@ fn value_findings(content: &Content, exposure: f32) -> Vec<Finding> {
         let found = format!("{} of surfaces have no hit distance", percent(content.hit_distance_missing));
         all.push(finding(Warning, found, "mirror reflections smear without: write it into the alpha of the radiance"));
     }
-    let [_, farthest_hit] = content.hit_distance;
-    let [_, median_depth, _] = content.depth;
-    if farthest_hit > 0.0 && farthest_hit <= 1.0 && median_depth > 4.0 {
+    let ([median_hit, _], [_, median_depth, _]) = (content.hit_distance, content.depth);
+    if median_hit > 0.0 && median_hit < 0.02 * median_depth {
         let found = format!(
-            "no hit distance is above {farthest_hit:.3}, where half of all surfaces are {median_depth:.1} away"
+            "half of all hit distances are below {median_hit:.3}, and half of all surfaces {median_depth:.1} away"
         );
-        all.push(finding(Warning, found, "they look normalised: write distances in world units"));
+        all.push(finding(Warning, found, "hit distances look scaled: write them in world units, as depth"));
     }
     let exposed = content.mean_radiance * f64::from(exposure);
     if exposed > 0.0 && !(0.03..=30.0).contains(&exposed) {

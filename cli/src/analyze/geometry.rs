@@ -75,6 +75,26 @@ pub enum MatrixTiming {
     FrameAfter,
 }
 
+/// Median distances between stored unit normals and those of the surface that the depth describes; about radians.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Apart {
+    /// As limpid takes both.
+    pub own: f64,
+    /// With the normals taken for view-space ones.
+    pub view: f64,
+    /// With the view matrix of the frame before, where the camera turns.
+    pub before: Option<f64>,
+    /// With that of the frame after.
+    pub after: Option<f64>,
+}
+
+impl Apart {
+    /// Whether another meaning fits clearly better. Below a tenth of a degree angles are those of rounding.
+    fn is_clearly(&self, other: f64) -> bool {
+        self.own > 2e-3 && other < 0.4 * self.own
+    }
+}
+
 /// How well depth and normals fit each other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Geometry {
@@ -90,9 +110,8 @@ pub struct Geometry {
     pub y_down: bool,
     /// Whose view matrices turn normals of the depth into those that are stored.
     pub matrices: MatrixTiming,
-    /// Median angle between both with the matrices of the own frame, the frame before and the frame after, in
-    /// radians; only where the camera turns.
-    pub angles: Option<[f64; 3]>,
+    /// Median distance between stored normals and those of the depth.
+    pub apart: Apart,
 }
 
 /// Cosine from which two normals agree: bumps and curved surfaces are allowed for.
@@ -108,8 +127,8 @@ pub(super) struct Gatherer {
     agreeing_y_down: usize,
     /// Stored normal in world space and that of the depth in view space, of the last frame, with its matrix.
     last: Option<(Mat3, Vec<[Vec3; 2]>)>,
-    /// Distances between stored normals and those of the depth, in the order of `MatrixTiming`.
-    distances: [Vec<f32>; 3],
+    /// Distances between stored normals and those of the depth: own, view, before, after.
+    distances: [Vec<f32>; 4],
 }
 
 /// Position in view space of a pixel with a depth, `None` if there is none.
@@ -184,43 +203,35 @@ impl Gatherer {
             let y_down = surface(DepthMeaning::Linear, &(inverse_projection * FLIPPED));
             self.agreeing_y_down += usize::from(y_down.is_some_and(|normal| agrees(candidates[0], normal)));
         }
-        self.add_timing(frame.reset, view_to_world, pairs);
+        self.add_distances(frame.reset, view_to_world, pairs);
     }
 
-    /// With matrices that come a frame late, this frame's are those of the images before, and the other way round.
-    fn add_timing(&mut self, reset: bool, matrix: Mat3, pairs: Vec<[Vec3; 2]>) {
+    /// `pairs` are normals as stored and those of the depth in view space. With matrices that come a frame late, this
+    /// frame's are those of the images before, and the other way round.
+    fn add_distances(&mut self, reset: bool, matrix: Mat3, pairs: Vec<[Vec3; 2]>) {
+        let distances = |matrix: Mat3, pairs: &[[Vec3; 2]]| -> Vec<f32> {
+            pairs.iter().map(|[stored, surface]| stored.distance(matrix * *surface)).collect()
+        };
+        self.distances[0].extend(distances(matrix, &pairs));
+        self.distances[1].extend(distances(Mat3::IDENTITY, &pairs));
         if let Some((last_matrix, last)) = self.last.take().filter(|(last, _)| !reset && *last != matrix) {
-            let distances = |matrix: Mat3, pairs: &[[Vec3; 2]]| -> Vec<f32> {
-                pairs.iter().map(|[stored, surface]| stored.distance(matrix * *surface)).collect()
-            };
-            self.distances[0].extend(distances(matrix, &pairs));
-            self.distances[1].extend(distances(matrix, &last));
-            self.distances[2].extend(distances(last_matrix, &pairs));
+            self.distances[2].extend(distances(matrix, &last));
+            self.distances[3].extend(distances(last_matrix, &pairs));
         }
         self.last = Some((matrix, pairs));
     }
 
-    /// Median angles, and whose matrices fit clearly best.
-    fn timing(&mut self) -> (Option<[f64; 3]>, MatrixTiming) {
+    fn apart(&mut self) -> Apart {
         let median = |values: &mut Vec<f32>| {
             values.sort_by(f32::total_cmp);
             values.get(values.len() / 2).map(|&value| f64::from(value))
         };
-        let [Some(own), Some(before), Some(after)] = self.distances.each_mut().map(median) else {
-            return (None, MatrixTiming::Own);
-        };
-        // Below a tenth of a degree angles are those of rounding.
-        let fits = |angle: f64, other: f64| own > 2e-3 && angle < 0.4 * own && angle < other;
-        let timing = match (fits(before, after), fits(after, before)) {
-            (true, _) => MatrixTiming::FrameBefore,
-            (_, true) => MatrixTiming::FrameAfter,
-            _ => MatrixTiming::Own,
-        };
-        (Some([own, before, after]), timing)
+        let [own, view, before, after] = self.distances.each_mut().map(median);
+        Apart { own: own.unwrap_or(0.0), view: view.unwrap_or(0.0), before, after }
     }
 
     pub(super) fn finish(mut self) -> Geometry {
-        let (angles, timing) = self.timing();
+        let apart = self.apart();
         // Of all samples, so that a meaning does not win by making an edge of everything.
         let agreement = |d: usize, n: usize| self.agreeing[d][n] as f64 / self.samples.max(1) as f64;
         let (mut best, mut best_agreement) = (EXPECTED, agreement(0, 0));
@@ -237,8 +248,17 @@ impl Gatherer {
         if y_down {
             (best, best_agreement) = (EXPECTED, y_down_agreement);
         }
-        let matrices = if best == EXPECTED && !y_down { timing } else { MatrixTiming::Own };
-        Geometry { samples: self.samples, agreement: agreement(0, 0), best, best_agreement, y_down, matrices, angles }
+        // A camera that looks nearly along an axis turns normals by too little for shares to tell.
+        if best == EXPECTED && !y_down && apart.is_clearly(apart.view) {
+            (best, best_agreement) = (Meaning { normal: NormalMeaning::View, ..EXPECTED }, agreement(0, 1));
+        }
+        let is_of = |other: Option<f64>| best == EXPECTED && !y_down && other.is_some_and(|d| apart.is_clearly(d));
+        let matrices = match (is_of(apart.before), is_of(apart.after)) {
+            (true, after) if !after || apart.before <= apart.after => MatrixTiming::FrameBefore,
+            (_, true) => MatrixTiming::FrameAfter,
+            _ => MatrixTiming::Own,
+        };
+        Geometry { samples: self.samples, agreement: agreement(0, 0), best, best_agreement, y_down, matrices, apart }
     }
 }
 

@@ -26,7 +26,7 @@ pub use content::Content;
 pub use geometry::{Geometry, MatrixTiming, Meaning};
 pub use motion::{CameraMeaning, Motion};
 pub use needs::Needs;
-pub use recommend::{Change, Cost, apply, toml_of};
+pub use recommend::{Change, Cost, apply, toml_of, untried};
 pub use verify::{Trial, Verification};
 
 use crate::sequence::Frame;
@@ -194,7 +194,7 @@ fn percent(share: f64) -> String {
 impl fmt::Display for Analysis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{} frames of {}x{}", self.frames, self.size.x, self.size.y)?;
-        write!(f, "{}{}{}", self.content, self.geometry, self.motion)?;
+        write!(f, "{}{}{}{}", self.content, self.geometry, self.motion, self.needs)?;
         if self.findings.is_empty() {
             writeln!(f, "\nNothing looks wrong.")?;
         }

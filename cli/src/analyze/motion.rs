@@ -32,9 +32,11 @@ pub struct Motion {
     pub moving: f64,
     /// Mean mismatch of surfaces where the motion vectors lead, 0 to 1.
     pub mismatch: f64,
+    /// The same of those that move.
+    pub moving_mismatch: f64,
     /// The factor on motion vectors that fits best, over the one in the settings.
     pub best_factor: Vec2,
-    /// Its mismatch.
+    /// The mismatch, with it, of those that move.
     pub best_mismatch: f64,
     /// Median distance between where motion vectors lead and where the cameras say, in pixels, for moving cameras.
     pub camera_residual: Option<f64>,
@@ -77,6 +79,8 @@ pub(super) struct Gatherer {
     factors: Vec<Vec2>,
     samples: usize,
     moving: usize,
+    mismatch: f64,
+    /// Of surfaces that move, for each factor: what rests fits whatever the factor.
     sums: Vec<Sums>,
     camera_residuals: [Vec<f32>; CAMERAS.len()],
     jittered_residuals: Vec<f32>,
@@ -173,6 +177,7 @@ impl Gatherer {
             factors,
             samples: 0,
             moving: 0,
+            mismatch: 0.0,
             camera_residuals: Default::default(),
             jittered_residuals: Vec::new(),
             has_jitter: false,
@@ -211,14 +216,18 @@ impl Gatherer {
             return;
         }
         self.samples += samples.len();
+        self.mismatch += mismatches[0].iter().sum::<f64>();
+        let moves = |sample: &Sample| (sample.motion * frame.size.as_vec2()).length() > 0.5;
         for (sums, values) in self.sums.iter_mut().zip(&mismatches) {
-            sums.mismatch += values.iter().sum::<f64>();
-            sums.count += values.len();
+            let of_moving = samples.iter().zip(values).filter(|(sample, _)| moves(sample));
+            for (_, value) in of_moving {
+                sums.mismatch += value;
+                sums.count += 1;
+            }
         }
         self.camera_moves |= frame.camera.world_to_view != previous.camera.world_to_view;
         for sample in &samples {
-            let pixels = (sample.motion * frame.size.as_vec2()).length();
-            self.moving += usize::from(pixels > 0.5);
+            self.moving += usize::from(moves(sample));
             self.add_residuals(previous, frame, sample, jitter);
         }
     }
@@ -243,11 +252,11 @@ impl Gatherer {
 
     pub(super) fn finish(mut self) -> Motion {
         let mean = |sums: &Sums| sums.mismatch / sums.count.max(1) as f64;
-        let mismatch = mean(&self.sums[0]);
-        let (mut best, mut best_mismatch) = (0, mismatch);
+        let moving_mismatch = mean(&self.sums[0]);
+        let (mut best, mut best_mismatch) = (0, moving_mismatch);
         for (index, sums) in self.sums.iter().enumerate() {
-            // Others have to be clearly better.
-            if mean(sums) < best_mismatch && mean(sums) < 0.8 * mismatch - 0.005 {
+            // Others have to be clearly better, and by more than chance.
+            if sums.count > 50 && mean(sums) < best_mismatch && mean(sums) < 0.8 * moving_mismatch - 0.005 {
                 (best, best_mismatch) = (index, mean(sums));
             }
         }
@@ -265,7 +274,8 @@ impl Gatherer {
         Motion {
             samples: self.samples,
             moving: share(self.moving),
-            mismatch,
+            mismatch: self.mismatch / self.samples.max(1) as f64,
+            moving_mismatch,
             best_factor: self.factors[best],
             best_mismatch,
             camera_residual: expected.filter(|_| self.camera_moves),

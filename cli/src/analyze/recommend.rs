@@ -176,7 +176,7 @@ fn footprint(needs: &Needs, settings: &Settings) -> Vec<Change> {
         let because = format!("the roughest surface has {roughest:.3}; it acts above {LIGHT_ROUGHNESS}");
         changes.push(Change::off("light_change", because, "no rougher material is added"));
     } else if needs.continued >= ENOUGH_FRAMES && needs.light_changes <= CHANCE {
-        let because = format!("light changes in no more than {} of cells", percent(needs.light_changes));
+        let because = format!("light changes in {} of a frame at most", percent(needs.light_changes));
         changes.push(Change::off("light_change", because, "lamps stay as bright as they are"));
     }
     if roughest < OUTLIER_ROUGHNESS {
@@ -234,6 +234,35 @@ fn published(needs: &Needs, settings: &Settings) -> Vec<Change> {
         changes.push(Change::off("mirror_parallax", because, CAMERA_RESTS));
     }
     changes
+}
+
+/// What else could be left out of settings: whether a sequence misses it can only be measured. Of several values of one
+/// setting the leanest comes first.
+pub fn untried(settings: &Settings, recommended: &[Change]) -> Vec<Change> {
+    const FEATURES: [&str; 9] = [
+        "spatial_filter",
+        "wide_filter",
+        "outlier_spread",
+        "history_clip",
+        "light_change",
+        "history_search",
+        "edge_repair",
+        "mirror_parallax",
+        "surface_motion",
+    ];
+    const NEAR_TAPS: [u32; 5] = [0, 2, 4, 6, 8];
+    let (because, holds_while) = ("its loss stays within the bound", "scenes are like these frames");
+    let off = FEATURES.iter().map(|feature| Change::off(feature, because, holds_while));
+    let taps = NEAR_TAPS.into_iter().filter(|taps| *taps < settings.features.near_taps);
+    let taps = taps.map(|taps| Change::new("features.near_taps", json!(taps), because, holds_while));
+    let cost = |settings: &Settings| Plan::new(settings, UVec2::splat(8)).ok().map(|(plan, _)| plan);
+    let (base, given) = (apply(settings, recommended).ok(), cost(settings));
+    let changes_plan = |change: &Change| {
+        let alone = apply(settings, [change]).ok().and_then(|settings| cost(&settings));
+        let with = base.as_ref().and_then(|base| apply(base, [change]).ok()).and_then(|settings| cost(&settings));
+        alone.is_some() && alone != given && with.is_some() && with != base.as_ref().and_then(cost)
+    };
+    taps.chain(off).filter(changes_plan).collect()
 }
 
 /// What settings cost by the plan, at 1920x1080.

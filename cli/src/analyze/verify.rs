@@ -1,5 +1,6 @@
 //! Whether recommended settings keep what they promise: both run on the same frames in turn.
 
+use std::collections::HashSet;
 use std::fmt::{self, Write};
 
 use anyhow::{Context, Result};
@@ -116,7 +117,7 @@ pub struct Verification {
     pub recommended: Measured,
     /// Each recommendation alone.
     pub single: Vec<Measured>,
-    /// Recommendations that lost more than the bound, with what they lost; they are no longer recommended.
+    /// Changes that lost more than the bound, with what they lost; they are not recommended.
     pub withdrawn: Vec<String>,
 }
 
@@ -198,6 +199,11 @@ impl<'g> Trial<'g> {
             withdrawn.push(format!("{change}: {}", one.complaint()));
             false
         });
+        // Of several values of a setting, the leanest comes first.
+        let mut known = HashSet::new();
+        changes.retain(|change| known.insert(change.setting.clone()));
+        // Two that are refused together: the one that the data says less about comes last.
+        while apply(self.given, changes.iter()).is_err() && changes.pop().is_some() {}
         // What does no harm alone can do so together: what loses most goes first.
         let recommended = loop {
             let sets = [changes.iter().collect()];
@@ -220,27 +226,26 @@ impl<'g> Trial<'g> {
 
 impl fmt::Display for Verification {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let ratio = |ratio: Option<f64>| ratio.map_or("not timed".to_owned(), |ratio| percent(1.0 - ratio));
+        let Measured { cpu_ratio, time_ratio, differences, .. } = &self.recommended;
         let mut text = format!("    {:<26}{:>10}{:>14}\n", "measured", "given", "recommended");
-        for difference in &self.recommended.differences {
-            let _ =
-                writeln!(text, "    {:<26}{:>10.4}{:>14.4}", difference.metric, difference.given, difference.changed);
+        for Difference { metric, given, changed, .. } in differences {
+            let _ = writeln!(text, "    {metric:<26}{given:>10.4}{changed:>14.4}");
         }
-        let _ = writeln!(
-            text,
-            "    saved: {} of processor time, {} of time",
-            ratio(self.recommended.cpu_ratio),
-            ratio(self.recommended.time_ratio)
-        );
-        let _ = writeln!(text, "    bound: {BOUND_TEXT}");
-        if !self.has_reference {
-            text += "    there are no references: the output with the settings given stands for them\n";
+        for (what, ratio) in [("processor time", cpu_ratio), ("time", time_ratio)] {
+            if let Some(ratio) = ratio {
+                let _ = writeln!(text, "    {what:<26}{:>10.3}{ratio:>14.3}{:>9}", 1.0, percent(1.0 - ratio));
+            }
         }
+        text += "\n    each alone, PSNR in dB\n";
         for one in &self.single {
-            let _ = writeln!(text, "    {:<40} alone: {:+.3} dB", one.settings.join(", "), -one.loss());
+            let _ = writeln!(text, "    {:<40}{:>+10.3}", one.settings.join(", "), -one.loss());
         }
         for withdrawn in &self.withdrawn {
-            let _ = writeln!(text, "    withdrawn, worse than the bound: {withdrawn}");
+            let _ = writeln!(text, "\n    worse than the bound, so not recommended: {withdrawn}");
+        }
+        let _ = writeln!(text, "\n    bound: {BOUND_TEXT}");
+        if !self.has_reference {
+            text += "    there are no references: the output with the settings given stands for them\n";
         }
         write!(f, "{text}    on {}\n", self.device)
     }

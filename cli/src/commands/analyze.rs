@@ -10,7 +10,7 @@ use limpid::Settings;
 use super::denoise::check_outputs;
 use super::interrupt;
 use super::settings::SettingsOptions;
-use crate::analyze::{Analysis, Analyzer, Trial};
+use crate::analyze::{Analysis, Analyzer, Trial, untried};
 use crate::backend::{self, Choice};
 use crate::bench::measure::Observer;
 use crate::bench::{Subject, Variant};
@@ -36,6 +36,9 @@ pub(super) struct Analyze {
     /// more than a bound.
     #[arg(long)]
     verify: bool,
+    /// The same, and try besides what the data alone cannot tell: every other feature, and fewer near taps.
+    #[arg(long)]
+    search: bool,
     /// How often each frame is timed for --verify; 0 for errors alone.
     #[arg(long, default_value_t = 3)]
     repetitions: u32,
@@ -72,6 +75,9 @@ impl Analyze {
         interrupt::listen()?;
         let trial = Trial::new(&sequence.name(), sequence.exposure(), frames, given, backend::settle(self.backend))?;
         let mut changes = analysis.changes.clone();
+        if self.search {
+            changes.extend(untried(given, &changes));
+        }
         let mut spinner = Spinner(ProgressBar::new_spinner().with_message("verifying"));
         let verification = trial.verify(&mut changes, self.repetitions, &mut spinner)?;
         spinner.0.finish_and_clear();
@@ -97,13 +103,13 @@ impl Analyze {
         let progress = ProgressBar::new(count as u64);
         for index in 0..count {
             let frame = sequence.load(index)?;
-            kept.extend(self.verify.then(|| frame.clone()));
+            kept.extend((self.verify || self.search).then(|| frame.clone()));
             analyzer.add(frame);
             progress.inc(1);
         }
         progress.finish_and_clear();
         let mut analysis = analyzer.finish()?;
-        if self.verify {
+        if self.verify || self.search {
             self.verify(&sequence, kept, &settings, &mut analysis)?;
         }
         if let Some(path) = &self.write_settings {
