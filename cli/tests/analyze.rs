@@ -146,7 +146,7 @@ const BREAKS: &[Break] = &[
     broken("no hit distances", "surfaces have no hit distance", |frames| {
         each(frames, |frame| frame.radiance.iter_mut().for_each(|texel| texel[3] = 0.0));
     }),
-    broken("hit distances over 100", "half of all hit distances are below", |frames| {
+    broken("hit distances over 100", "a quarter of all hit distances are below", |frames| {
         each(frames, |frame| frame.radiance.iter_mut().for_each(|texel| texel[3] *= 0.01));
     }),
     broken("roughness in percent", "is not within 0 and 1", |frames| {

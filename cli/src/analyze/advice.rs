@@ -77,18 +77,16 @@ fn geometry_findings(geometry: &Geometry) -> Vec<Finding> {
         let found = format!("normals look like {what}: {fit}");
         all.push(finding(Severity::Error, found, advice));
     }
-    let apart = geometry.apart;
+    let [own, before, after] = geometry.apart.turned.unwrap_or_default().map(f64::to_degrees);
     let timing = match geometry.matrices {
         MatrixTiming::Own => None,
-        MatrixTiming::FrameBefore => apart.before.map(|angle| ("before", angle)),
-        MatrixTiming::FrameAfter => apart.after.map(|angle| ("after", angle)),
+        MatrixTiming::FrameBefore => Some(("before", before)),
+        MatrixTiming::FrameAfter => Some(("after", after)),
     };
     if let Some((whose, angle)) = timing {
         let found = format!(
-            "the view matrices look like those of the frame {whose}: then normals are off by {:.2} degrees at the \
-             median, as they are by {:.2}",
-            angle.to_degrees(),
-            apart.own.to_degrees()
+            "the view matrices look like those of the frame {whose}: then normals are off by {angle:.2} degrees at the \
+             median, as they are by {own:.2}"
         );
         all.push(finding(Severity::Error, found, "write the matrices that the frame's own images were rendered with"));
     }
@@ -194,10 +192,10 @@ fn value_findings(content: &Content, exposure: f32) -> Vec<Finding> {
         let found = format!("{} of surfaces have no hit distance", percent(content.hit_distance_missing));
         all.push(finding(Warning, found, "mirror reflections smear without: write it into the alpha of the radiance"));
     }
-    let ([median_hit, _], [_, median_depth, _]) = (content.hit_distance, content.depth);
-    if median_hit > 0.0 && median_hit < 0.02 * median_depth {
+    let ([near_hit, ..], [_, median_depth, _]) = (content.hit_distance, content.depth);
+    if near_hit > 0.0 && near_hit < 0.01 * median_depth {
         let found = format!(
-            "half of all hit distances are below {median_hit:.3}, and half of all surfaces {median_depth:.1} away"
+            "a quarter of all hit distances are below {near_hit:.3}, and half of all surfaces {median_depth:.1} away"
         );
         all.push(finding(Warning, found, "hit distances look scaled: write them in world units, as depth"));
     }

@@ -46,8 +46,8 @@ pub struct Content {
     pub normals_zero: f64,
     /// Surfaces with a hit distance of 0 or less.
     pub hit_distance_missing: f64,
-    /// Median and largest hit distance of rays that hit something.
-    pub hit_distance: [f32; 2],
+    /// Quartile, median and largest hit distance of rays that hit something.
+    pub hit_distance: [f32; 3],
     /// Surfaces whose ray left the scene.
     pub misses: f64,
     /// Mean of the radiance's brightest channel, surfaces only.
@@ -154,7 +154,7 @@ impl Gatherer {
         let (surfaces, counts) = (self.surfaces, &self.counts);
         self.depths.retain(|depth| depth.is_finite());
         let depth = quantiles(&mut self.depths, [0.0, 0.5, 1.0]);
-        let hit_distance = quantiles(&mut self.hit_distances, [0.5, 1.0]);
+        let hit_distance = quantiles(&mut self.hit_distances, [0.25, 0.5, 1.0]);
         let mean_radiance = self.radiance_sum / surfaces.max(1) as f64;
         let is_firefly = |value: &&f32| f64::from(**value) > 50.0 * mean_radiance;
         Content {
@@ -211,7 +211,7 @@ impl fmt::Display for Content {
             percent(self.fireflies)
         )?;
         let (missing, misses) = (percent(self.hit_distance_missing), percent(self.misses));
-        let [half, most] = self.hit_distance;
+        let [_, half, most] = self.hit_distance;
         writeln!(
             f,
             "  hit distance median {half:.3}, up to {most:.3}; {missing} have none, {misses} of rays leave the scene"

@@ -82,17 +82,14 @@ pub struct Apart {
     pub own: f64,
     /// With the normals taken for view-space ones.
     pub view: f64,
-    /// With the view matrix of the frame before, where the camera turns.
-    pub before: Option<f64>,
-    /// With that of the frame after.
-    pub after: Option<f64>,
+    /// Of surfaces that the camera turns against: with their own view matrix, that of the frame before, and that of the
+    /// frame after.
+    pub turned: Option<[f64; 3]>,
 }
 
-impl Apart {
-    /// Whether another meaning fits clearly better. Below a tenth of a degree angles are those of rounding.
-    fn is_clearly(&self, other: f64) -> bool {
-        self.own > 2e-3 && other < 0.4 * self.own
-    }
+/// Whether a distance is clearly below another. Below a tenth of a degree it is that of rounding.
+fn is_clearly_below(distance: f64, other: f64) -> bool {
+    other > 2e-3 && distance < 0.4 * other
 }
 
 /// How well depth and normals fit each other.
@@ -127,8 +124,8 @@ pub(super) struct Gatherer {
     agreeing_y_down: usize,
     /// Stored normal in world space and that of the depth in view space, of the last frame, with its matrix.
     last: Option<(Mat3, Vec<[Vec3; 2]>)>,
-    /// Distances between stored normals and those of the depth: own, view, before, after.
-    distances: [Vec<f32>; 4],
+    /// Distances between stored normals and those of the depth: own, view; own, before and after of what turned.
+    distances: [Vec<f32>; 5],
 }
 
 /// Position in view space of a pixel with a depth, `None` if there is none.
@@ -162,6 +159,25 @@ fn surface_normal([center, right, below]: [Vec3; 3]) -> Option<Vec3> {
         return None;
     }
     let normal = (right - center).cross(below - center).normalize_or_zero();
+    Some(if normal.dot(center) > 0.0 { -normal } else { normal })
+}
+
+/// The same as of neighbours on both sides, which is right of curved surfaces too. Not for pixels at the border.
+fn smooth_normal(frame: &Frame, inverse_projection: &Mat4, pixel: UVec2) -> Option<Vec3> {
+    let position = |dx: i32, dy: i32| {
+        let at = pixel.as_ivec2() + glam::IVec2::new(dx, dy);
+        let depth = frame.depth[(at.y * frame.size.x as i32 + at.x) as usize];
+        let meaning = DepthMeaning::Linear;
+        let place = view_position(&frame.camera, inverse_projection, frame.size, at.as_vec2(), depth, meaning);
+        place.filter(|_| depth > 0.0)
+    };
+    let center = position(0, 0)?;
+    let [left, right, above, below] = [position(-1, 0)?, position(1, 0)?, position(0, -1)?, position(0, 1)?];
+    let is_edge = |other: Vec3| (other.length() / center.length() - 1.0).abs() > 0.05;
+    if [left, right, above, below].into_iter().any(is_edge) {
+        return None;
+    }
+    let normal = (right - left).cross(below - above).normalize_or_zero();
     Some(if normal.dot(center) > 0.0 { -normal } else { normal })
 }
 
@@ -199,7 +215,7 @@ impl Gatherer {
                     self.agreeing[d][n] += usize::from(agrees(*candidate, normal));
                 }
             }
-            pairs.extend(surface(DepthMeaning::Linear, &inverse_projection).map(|normal| [candidates[0], normal]));
+            pairs.extend(smooth_normal(frame, &inverse_projection, pixel).map(|normal| [candidates[0], normal]));
             let y_down = surface(DepthMeaning::Linear, &(inverse_projection * FLIPPED));
             self.agreeing_y_down += usize::from(y_down.is_some_and(|normal| agrees(candidates[0], normal)));
         }
@@ -214,20 +230,28 @@ impl Gatherer {
         };
         self.distances[0].extend(distances(matrix, &pairs));
         self.distances[1].extend(distances(Mat3::IDENTITY, &pairs));
-        if let Some((last_matrix, last)) = self.last.take().filter(|(last, _)| !reset && *last != matrix) {
-            self.distances[2].extend(distances(matrix, &last));
-            self.distances[3].extend(distances(last_matrix, &pairs));
+        if let Some((last_matrix, last)) = self.last.take().filter(|_| !reset) {
+            // The ground says nothing of a camera that turns about what is upright.
+            let turned = |pairs: &[[Vec3; 2]]| -> Vec<[Vec3; 2]> {
+                let turns = |[_, n]: &&[Vec3; 2]| (matrix * *n).distance(last_matrix * *n) > 2e-3;
+                pairs.iter().filter(turns).copied().collect()
+            };
+            let (now, last) = (turned(&pairs), turned(&last));
+            self.distances[2].extend(distances(matrix, &now));
+            self.distances[3].extend(distances(matrix, &last));
+            self.distances[4].extend(distances(last_matrix, &now));
         }
         self.last = Some((matrix, pairs));
     }
 
     fn apart(&mut self) -> Apart {
+        let enough = self.distances[2..].iter().all(|values| values.len() > 50);
         let median = |values: &mut Vec<f32>| {
             values.sort_by(f32::total_cmp);
-            values.get(values.len() / 2).map(|&value| f64::from(value))
+            values.get(values.len() / 2).map_or(0.0, |&value| f64::from(value))
         };
-        let [own, view, before, after] = self.distances.each_mut().map(median);
-        Apart { own: own.unwrap_or(0.0), view: view.unwrap_or(0.0), before, after }
+        let [own, view, turned @ ..] = self.distances.each_mut().map(median);
+        Apart { own, view, turned: enough.then_some(turned) }
     }
 
     pub(super) fn finish(mut self) -> Geometry {
@@ -249,13 +273,14 @@ impl Gatherer {
             (best, best_agreement) = (EXPECTED, y_down_agreement);
         }
         // A camera that looks nearly along an axis turns normals by too little for shares to tell.
-        if best == EXPECTED && !y_down && apart.is_clearly(apart.view) {
+        if best == EXPECTED && !y_down && is_clearly_below(apart.view, apart.own) {
             (best, best_agreement) = (Meaning { normal: NormalMeaning::View, ..EXPECTED }, agreement(0, 1));
         }
-        let is_of = |other: Option<f64>| best == EXPECTED && !y_down && other.is_some_and(|d| apart.is_clearly(d));
-        let matrices = match (is_of(apart.before), is_of(apart.after)) {
-            (true, after) if !after || apart.before <= apart.after => MatrixTiming::FrameBefore,
+        let [own, before, after] = apart.turned.filter(|_| best == EXPECTED && !y_down).unwrap_or_default();
+        let matrices = match (is_clearly_below(before, own), is_clearly_below(after, own)) {
+            (true, _) if before <= after => MatrixTiming::FrameBefore,
             (_, true) => MatrixTiming::FrameAfter,
+            (true, _) => MatrixTiming::FrameBefore,
             _ => MatrixTiming::Own,
         };
         Geometry { samples: self.samples, agreement: agreement(0, 0), best, best_agreement, y_down, matrices, apart }

@@ -74,14 +74,24 @@ struct Sums {
     count: usize,
 }
 
+impl Sums {
+    fn add(&mut self, mismatch: f64) {
+        self.mismatch += mismatch;
+        self.count += 1;
+    }
+
+    fn mean(&self) -> f64 {
+        self.mismatch / self.count.max(1) as f64
+    }
+}
+
 /// Surfaces of a frame whose motion tells one convention from another.
 pub(super) struct Gatherer {
     factors: Vec<Vec2>,
     samples: usize,
     moving: usize,
-    mismatch: f64,
-    /// Of surfaces that move, for each factor: what rests fits whatever the factor.
-    sums: Vec<Sums>,
+    /// Of all surfaces, for each factor, and of those that move: what rests fits whatever the factor.
+    sums: [Vec<Sums>; 2],
     camera_residuals: [Vec<f32>; CAMERAS.len()],
     jittered_residuals: Vec<f32>,
     has_jitter: bool,
@@ -173,11 +183,10 @@ impl Gatherer {
     pub(super) fn new(size: UVec2) -> Self {
         let factors = factors(size);
         Self {
-            sums: factors.iter().map(|_| Sums::default()).collect(),
+            sums: [(); 2].map(|()| factors.iter().map(|_| Sums::default()).collect()),
             factors,
             samples: 0,
             moving: 0,
-            mismatch: 0.0,
             camera_residuals: Default::default(),
             jittered_residuals: Vec::new(),
             has_jitter: false,
@@ -216,13 +225,14 @@ impl Gatherer {
             return;
         }
         self.samples += samples.len();
-        self.mismatch += mismatches[0].iter().sum::<f64>();
         let moves = |sample: &Sample| (sample.motion * frame.size.as_vec2()).length() > 0.5;
-        for (sums, values) in self.sums.iter_mut().zip(&mismatches) {
-            let of_moving = samples.iter().zip(values).filter(|(sample, _)| moves(sample));
-            for (_, value) in of_moving {
-                sums.mismatch += value;
-                sums.count += 1;
+        let [all, moving] = &mut self.sums;
+        for ((all, moving), values) in all.iter_mut().zip(moving).zip(&mismatches) {
+            for (sample, value) in samples.iter().zip(values) {
+                all.add(*value);
+                if moves(sample) {
+                    moving.add(*value);
+                }
             }
         }
         self.camera_moves |= frame.camera.world_to_view != previous.camera.world_to_view;
@@ -251,15 +261,23 @@ impl Gatherer {
     }
 
     pub(super) fn finish(mut self) -> Motion {
-        let mean = |sums: &Sums| sums.mismatch / sums.count.max(1) as f64;
-        let moving_mismatch = mean(&self.sums[0]);
-        let (mut best, mut best_mismatch) = (0, moving_mismatch);
-        for (index, sums) in self.sums.iter().enumerate() {
-            // Others have to be clearly better, and by more than chance.
-            if sums.count > 50 && mean(sums) < best_mismatch && mean(sums) < 0.8 * moving_mismatch - 0.005 {
-                (best, best_mismatch) = (index, mean(sums));
-            }
-        }
+        let [all, moving] = &self.sums;
+        let least =
+            |sums: &[Sums]| (0..sums.len()).min_by(|&a, &b| sums[a].mean().total_cmp(&sums[b].mean())).unwrap_or(0);
+        // Others have to be clearly better; where little moves, by far, since things that move lie elsewhere anyway.
+        let (best_of_all, best_of_moving) = (least(all), least(moving));
+        let mismatch = all[0].mean();
+        let best = if all[best_of_all].mean() < 0.8 * mismatch - 0.005 {
+            best_of_all
+        } else if moving[0].count > 50
+            && moving[0].mean() > 0.5
+            && moving[best_of_moving].mean() < 0.5 * moving[0].mean()
+        {
+            best_of_moving
+        } else {
+            0
+        };
+        let [moving_mismatch, best_mismatch] = [0, best].map(|index| moving[index].mean());
         let median = |values: &mut Vec<f32>| {
             values.sort_by(f32::total_cmp);
             values.get(values.len() / 2).map(|&value| f64::from(value))
@@ -274,7 +292,7 @@ impl Gatherer {
         Motion {
             samples: self.samples,
             moving: share(self.moving),
-            mismatch: self.mismatch / self.samples.max(1) as f64,
+            mismatch,
             moving_mismatch,
             best_factor: self.factors[best],
             best_mismatch,
