@@ -25,6 +25,8 @@ const CELL: u32 = 8;
 const CELL_SAMPLES: f64 = 16.0;
 /// Change of brightness between two frames at rest that is not rounding.
 const VISIBLE: f32 = 0.02;
+/// Pixels that a surface at rest may seem to move by, through rounding.
+const AT_REST: f32 = 0.02;
 /// Steps of roughness.
 const STEPS: usize = 255;
 
@@ -45,7 +47,7 @@ pub struct Needs {
     pub outliers: f64,
     /// Whether all frames have the same camera.
     pub camera_rests: bool,
-    /// Surfaces with motion vectors that are not 0.
+    /// Surfaces with motion vectors that are not next to 0.
     pub moving: f64,
     /// Cells of 8x8 pixels, in the frame where it is most, whose light changes at roughness above 0.05.
     pub light_changes: f64,
@@ -167,10 +169,10 @@ impl Gatherer {
             let [low, high] = self.roughness;
             self.roughness = [low.min(frame.roughness[i]), high.max(frame.roughness[i])];
             let motion = Vec2::from(frame.motion[i]) * frame.size.as_vec2();
-            self.moving += usize::from(motion.length() > 0.02);
+            self.moving += usize::from(motion.length() > AT_REST);
             let radius = self.filter_radius(frame, &inverse, i);
-            self.wide += usize::from(!(radius[1] <= WIDE[0]));
-            self.narrow += usize::from(!(radius[0] >= WIDE[1]));
+            self.wide += usize::from(radius[1].is_nan() || radius[1] > WIDE[0]);
+            self.narrow += usize::from(radius[0].is_nan() || radius[0] < WIDE[1]);
         }
         self.add_outliers(frame);
         if let Some(history) = History::new(frame, previous) {
@@ -253,8 +255,9 @@ impl Gatherer {
     /// What differs where nothing moved.
     fn add_noise(&mut self, frame: &Frame, previous: &Frame) {
         for i in 0..frame.pixels() {
-            let rests =
-                frame.motion[i] == [0.0; 2] && self.is_denoised(frame, i) && frame.depth[i] == previous.depth[i];
+            let motion = Vec2::from(frame.motion[i]) * frame.size.as_vec2();
+            let is_same = (frame.depth[i] - previous.depth[i]).abs() <= 1e-4 * frame.depth[i];
+            let rests = self.is_denoised(frame, i) && motion.length() <= AT_REST && is_same;
             if !rests {
                 continue;
             }

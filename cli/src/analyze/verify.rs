@@ -240,13 +240,16 @@ impl fmt::Display for Verification {
         for one in &self.single {
             let _ = writeln!(text, "    {:<40}{:>+10.3}", one.settings.join(", "), -one.loss());
         }
+        if !self.withdrawn.is_empty() {
+            text += "\n    not recommended, worse than the bound\n";
+        }
         for withdrawn in &self.withdrawn {
-            let _ = writeln!(text, "\n    worse than the bound, so not recommended: {withdrawn}");
+            let _ = writeln!(text, "    {withdrawn}");
         }
         let _ = writeln!(text, "\n    bound: {BOUND_TEXT}");
         if !self.has_reference {
             text += "    there are no references: the output with the settings given stands for them\n";
         }
-        write!(f, "{text}    on {}\n", self.device)
+        writeln!(f, "{text}    on {}", self.device)
     }
 }
