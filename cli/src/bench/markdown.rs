@@ -99,7 +99,7 @@ pub fn markdown(report: &Report) -> String {
     format!(
         "# Measured by limpid bench\n\nlimpid {} on {}. {} frames a scene, {} rays a pixel in references, each frame \
          timed {} times; times are over those of Reference in the same run.\n\n{meanings}\n\
-         ## Over all sequences\n\n{}\n## By sequence\n\n{}\n## By kind of pixel\n\nRoot mean squared errors.\n\n{}\n\
+         ## Over all sequences\n\nBut `events`, which is for recovery.\n\n{}\n## By sequence\n\n{}\n## By kind of pixel\n\nRoot mean squared errors.\n\n{}\n\
          ## Recovery\n\n{}\n## Costs that are the same everywhere\n\nBytes are a pixel.\n\n{}",
         report.limpid,
         report.device,

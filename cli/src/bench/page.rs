@@ -293,14 +293,14 @@ fn regions(report: &Report) -> String {
         .collect();
     format!(
         "<h2>Error by kind of pixel</h2><p class=note>Root mean squared error where the surface was just uncovered, on \
-         mirrors, on rough surfaces, and beside fireflies of the input. Empty where a sequence has no such pixels; their \
+         mirrors, on rough surfaces, and beside fireflies of the input. A dash where a sequence has no such pixels; their \
          shares are in the table of sequences below.</p>{}",
         table(&header, &rows)
     )
 }
 
 fn sequences(report: &Report) -> String {
-    let mut header = plain(&["sequence", "size", "frames", "reference's own PSNR"]);
+    let mut header = plain(&["sequence", "size", "frames", "PSNR of the converged image"]);
     header.extend(REGIONS.map(|name| (format!("{name} %"), "share of pixels".to_owned())));
     let rows: Vec<_> = report
         .sequences
@@ -333,7 +333,10 @@ pub fn page(report: &Report, pictures: &[(String, Vec<u8>)]) -> String {
         let shown = all.iter().filter(|(name, _)| name.starts_with(prefix)).map(|(_, svg)| svg.as_str());
         format!("<div class=figures>{}</div>\n", shown.collect::<String>())
     };
-    html = html + "<h2>Error against run time</h2>" + &show("pareto") + &overview(report);
+    html = html + "<h2>Error against run time</h2>" + &show("pareto");
+    html += "<p class=note>Means over all sequences but `events`, which is for recovery. `reference` is the preset, not the \
+             converged image.</p>";
+    html = html + &overview(report);
     html = html + &regions(report) + &ablations(report);
     html = html + "<h2>Convergence</h2>" + &show("convergence") + &recovery(report) + &show("recovery");
     html = html + "<h2>Scaling</h2>" + &show("scaling");
