@@ -69,7 +69,9 @@ fn what_was_interrupted_goes_on() {
     // Two sequences; noisy, accumulation, three presets and two values.
     assert_eq!(whole_report.runs.len(), 14);
     assert_eq!(whole_report, parts_report);
-    for file in ["report.html", "bench.csv", "figures/convergence-still.svg", "pictures/mirrors--default.png"] {
+    for file in
+        ["report.html", "bench.csv", "measured.md", "figures/convergence-still.svg", "pictures/mirrors--default.png"]
+    {
         assert!(parts.join(file).is_file(), "{file}");
     }
     // A worse setting is noticed, and time never is.

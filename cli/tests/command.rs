@@ -248,7 +248,7 @@ fn data_that_means_something_else_is_recognised() {
     let noisy = out.join("noisy");
     let right = succeeds(&["analyze", path(&noisy), "--json"]);
     let right: serde_json::Value = serde_json::from_str(&right).unwrap();
-    assert_eq!(right["settings"], "");
+    assert!(!right["settings"].as_str().unwrap().contains("conventions"), "{right}");
     // With the wrong sign in the settings the right one is advised.
     let wrong = ["analyze", path(&noisy), "--set", "conventions.motion_scale=[-1.0, -1.0]"];
     fails(&wrong, 1, &["does not mean what limpid takes it for"]);
@@ -257,9 +257,41 @@ fn data_that_means_something_else_is_recognised() {
     fails(&["analyze", path(&folder.join("nowhere"))], 1, &["camera.json"]);
 }
 
+/// What analyze writes, every command reads, and it costs less.
+#[test]
+fn recommended_settings_are_a_file_for_other_commands() {
+    let folder = Folder::new("recommended");
+    let demo_out = folder.join("still");
+    let scene = ["demo", "--scene", "still", "--size", "64x36", "--frames", "6", "--samples", "16"];
+    succeeds(&[&scene[..], &["--out", path(&demo_out)]].concat());
+    let (noisy, file) = (demo_out.join("noisy"), folder.join("smallest.toml"));
+    let base = ["analyze", path(&noisy), "--write-settings", path(&file)];
+    let searched = ["--search", "--repetitions", "1", "--backend", "cpu", "--json"];
+    let json = succeeds(&[&base[..], &searched].concat());
+    let analysis: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let differences = analysis["verification"]["recommended"]["differences"].as_array().unwrap();
+    assert!(differences.len() == 4 && differences.iter().all(|d| d["beyond_bound"] == false), "{json}");
+    assert!(analysis["verification"]["recommended"]["cpu_ratio"].as_f64().is_some_and(|ratio| ratio > 0.0), "{json}");
+    let cost = |at: usize, what: &str| analysis["predicted"][at][what].as_f64().unwrap();
+    for what in ["bytes", "bindings", "instructions"] {
+        assert!(cost(1, what) < cost(0, what), "{what}: {json}");
+    }
+    let plan = succeeds(&["plan", "--json", "--settings", path(&file)]);
+    let plan: limpid::Plan = serde_json::from_str(&plan).unwrap();
+    assert_eq!(plan.passes.len() as f64, cost(1, "passes"));
+    succeeds(&["denoise", path(&noisy), "--out", path(&folder.join("out")), "--settings", path(&file)]);
+    let out = folder.join("shaders");
+    succeeds(&["export", "--target", "wgsl", "--out", path(&out), "--settings", path(&file)]);
+    fails(&base, 1, &["smallest.toml exists", "--force"]);
+}
+
 #[test]
 fn stability_is_judged_case_by_case() {
-    let json = succeeds(&["stability", "--backend", "cpu", "--case", "NaN at one pixel", "--json"]);
+    let folder = Folder::new("stability");
+    let table = folder.join("table.md");
+    let one = ["stability", "--backend", "cpu", "--case", "NaN at one pixel", "--json", "--table", path(&table)];
+    let json = succeeds(&one);
+    assert!(fs::read_to_string(&table).unwrap().contains("| all | 2 | 24 | 24 |  |"));
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();
     let verdicts = report["verdicts"].as_array().unwrap();
     // Two cases with three presets: finite, bounded, footprint and lifetime.

@@ -1,9 +1,12 @@
 //! What a user should know and do.
 
-use limpid::settings::Conventions;
+use limpid::settings::{Conventions, NdcY};
+use serde_json::json;
 
+use super::conform::Transposed;
 use super::content::PUBLISHED_THRESHOLD;
-use super::geometry::{DepthMeaning, EXPECTED, NormalMeaning};
+use super::geometry::{DepthMeaning, EXPECTED, MatrixTiming, NormalMeaning};
+use super::recommend::{Change, number};
 use super::{CameraMeaning, Content, Finding, Geometry, Motion, Severity, percent};
 
 fn finding(severity: Severity, found: impl Into<String>, advice: impl Into<String>) -> Finding {
@@ -31,8 +34,8 @@ fn geometry_findings(geometry: &Geometry) -> Vec<Finding> {
         return all;
     }
     if geometry.y_down {
-        let found = "the projection matrices look as if clip space had y down";
-        let advice = "negate their second row, or set conventions.ndc_y to \"down\"";
+        let found = "the projection matrices look as if clip space had y the other way";
+        let advice = "negate their second row, or set conventions.ndc_y";
         all.push(finding(Severity::Error, found, advice));
     }
     let (share, best) = (percent(geometry.agreement), percent(geometry.best_agreement));
@@ -63,8 +66,29 @@ fn geometry_findings(geometry: &Geometry) -> Vec<Finding> {
             ),
             NormalMeaning::Inward => ("normals that point into the surface", "negate them"),
         };
-        let found = format!("normals look like {what}: then {best} fit the surface, as they are {share}");
+        // Shares are of normals that fit roughly.
+        let fit = match geometry.best_agreement > geometry.agreement + 0.02 {
+            true => format!("then {best} fit the surface, as they are {share}"),
+            false => {
+                let [other, own] = [geometry.apart.view, geometry.apart.own].map(f64::to_degrees);
+                format!("then they are off by {other:.2} degrees at the median, as they are by {own:.2}")
+            }
+        };
+        let found = format!("normals look like {what}: {fit}");
         all.push(finding(Severity::Error, found, advice));
+    }
+    let [own, before, after] = geometry.apart.turned.unwrap_or_default().map(f64::to_degrees);
+    let timing = match geometry.matrices {
+        MatrixTiming::Own => None,
+        MatrixTiming::FrameBefore => Some(("before", before)),
+        MatrixTiming::FrameAfter => Some(("after", after)),
+    };
+    if let Some((whose, angle)) = timing {
+        let found = format!(
+            "the view matrices look like those of the frame {whose}: then normals are off by {angle:.2} degrees at the \
+             median, as they are by {own:.2}"
+        );
+        all.push(finding(Severity::Error, found, "write the matrices that the frame's own images were rendered with"));
     }
     if geometry.best == EXPECTED && geometry.agreement < 0.5 {
         let found = format!("only {share} of normals are those of the surface that the depth describes");
@@ -76,7 +100,7 @@ fn geometry_findings(geometry: &Geometry) -> Vec<Finding> {
 
 fn motion_findings(motion: &Motion, conventions: &Conventions) -> Vec<Finding> {
     let mut all = Vec::new();
-    let (as_is, best) = (percent(1.0 - motion.mismatch), percent(1.0 - motion.best_mismatch));
+    let as_is = percent(1.0 - motion.mismatch);
     if motion.best_factor != glam::Vec2::ONE {
         let scale = motion.best_factor * conventions.motion_scale;
         let why = if motion.best_factor.abs().max_element() < 0.2 {
@@ -89,8 +113,11 @@ fn motion_findings(motion: &Motion, conventions: &Conventions) -> Vec<Finding> {
             "they look like normalised device coordinates"
         };
         let found = format!(
-            "motion vectors lead to the same surface for {as_is} of pixels; times ({}, {}) for {best}: {why}",
-            motion.best_factor.x, motion.best_factor.y
+            "motion vectors lead to the same surface for {} of what moves; times ({}, {}) for {}: {why}",
+            percent(1.0 - motion.moving_mismatch),
+            motion.best_factor.x,
+            motion.best_factor.y,
+            percent(1.0 - motion.best_mismatch)
         );
         let advice = format!("set conventions.motion_scale to [{}, {}]", scale.x, scale.y);
         all.push(finding(Severity::Error, found, advice));
@@ -165,6 +192,13 @@ fn value_findings(content: &Content, exposure: f32) -> Vec<Finding> {
         let found = format!("{} of surfaces have no hit distance", percent(content.hit_distance_missing));
         all.push(finding(Warning, found, "mirror reflections smear without: write it into the alpha of the radiance"));
     }
+    let ([near_hit, ..], [_, median_depth, _]) = (content.hit_distance, content.depth);
+    if near_hit > 0.0 && near_hit < 0.01 * median_depth {
+        let found = format!(
+            "a quarter of all hit distances are below {near_hit:.3}, and half of all surfaces {median_depth:.1} away"
+        );
+        all.push(finding(Warning, found, "hit distances look scaled: write them in world units, as depth"));
+    }
     let exposed = content.mean_radiance * f64::from(exposure);
     if exposed > 0.0 && !(0.03..=30.0).contains(&exposed) {
         let found = format!("exposed radiance is {exposed:.4} on average; constants were tuned near 1");
@@ -195,26 +229,37 @@ fn cost_findings(content: &Content) -> Vec<Finding> {
         );
         all.push(finding(Severity::Note, found, advice));
     }
-    if content.roughness_is_constant {
-        let found = "all surfaces have the same roughness";
-        all.push(finding(Severity::Note, found, "with features.constant_roughness there is no such input"));
-    }
-    if content.mirrors > 0.0 && content.mirrors + content.sky > 0.999_999 {
-        let advice = "nothing is lost without features.outlier_spread and features.light_change";
-        all.push(finding(Severity::Note, "all surfaces are mirrors", advice));
-    }
     all
 }
 
-/// Settings that differ from the conventions given, as TOML.
-pub(super) fn settings(motion: &Motion, conventions: &Conventions) -> String {
-    let mut lines = Vec::new();
+/// Matrices that hold columns where rows are expected.
+pub(super) fn transposed(which: Transposed) -> Vec<Finding> {
+    let advice = "write them row by row for column vectors (clip = proj * view * world); the rest was looked at with \
+                  them turned";
+    let all = [(which.view, "view"), (which.projection, "projection")];
+    let all = all.into_iter().filter(|(is_it, _)| *is_it);
+    all.map(|(_, name)| finding(Severity::Error, format!("the {name} matrices are transposed"), advice)).collect()
+}
+
+/// Conventions that mend what was found.
+pub(super) fn conventions(geometry: &Geometry, motion: &Motion, given: &Conventions) -> Vec<Change> {
+    let mut changes = Vec::new();
+    let mut mend = |setting: &str, value, because: &str| {
+        changes.push(Change::new(&format!("conventions.{setting}"), value, because, "the data is encoded so"));
+    };
     if motion.best_factor != glam::Vec2::ONE {
-        let scale = motion.best_factor * conventions.motion_scale;
-        lines.push(format!("motion_scale = [{:?}, {:?}]", scale.x, scale.y));
+        let scale = motion.best_factor * given.motion_scale;
+        mend("motion_scale", json!([number(scale.x), number(scale.y)]), "then they lead to the same surface");
     }
-    if motion.includes_jitter && !conventions.motion_includes_jitter {
-        lines.push("motion_includes_jitter = true".to_owned());
+    if motion.includes_jitter && !given.motion_includes_jitter {
+        mend("motion_includes_jitter", json!(true), "motion vectors contain the camera's jitter");
     }
-    if lines.is_empty() { String::new() } else { format!("[conventions]\n{}\n", lines.join("\n")) }
+    if geometry.best.normal == NormalMeaning::WorldUnsigned {
+        mend("normal", json!("unsigned"), "then normals are those of the surface");
+    }
+    if geometry.y_down {
+        let other = if given.ndc_y == NdcY::Up { "down" } else { "up" };
+        mend("ndc_y", json!(other), "then normals are those of the surface");
+    }
+    changes
 }

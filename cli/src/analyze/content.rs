@@ -46,6 +46,8 @@ pub struct Content {
     pub normals_zero: f64,
     /// Surfaces with a hit distance of 0 or less.
     pub hit_distance_missing: f64,
+    /// Quartile, median and largest hit distance of rays that hit something.
+    pub hit_distance: [f32; 3],
     /// Surfaces whose ray left the scene.
     pub misses: f64,
     /// Mean of the radiance's brightest channel, surfaces only.
@@ -68,6 +70,7 @@ pub(super) struct Gatherer {
     radiance_sum: f64,
     radiance: Vec<f32>,
     depths: Vec<f32>,
+    hit_distances: Vec<f32>,
     roughness_range: Option<(f32, f32)>,
     largest_radiance: f32,
 }
@@ -125,6 +128,7 @@ impl Gatherer {
             if i.is_multiple_of(7) {
                 self.radiance.push(brightest);
                 self.depths.push(frame.depth[i]);
+                self.hit_distances.extend((0.0 < hit_distance && hit_distance < MISS).then_some(hit_distance));
             }
         }
     }
@@ -149,11 +153,8 @@ impl Gatherer {
         let of = |count: usize, all: usize| count as f64 / all.max(1) as f64;
         let (surfaces, counts) = (self.surfaces, &self.counts);
         self.depths.retain(|depth| depth.is_finite());
-        self.depths.sort_by(f32::total_cmp);
-        let at = |share: f64| {
-            let last = self.depths.len().saturating_sub(1);
-            self.depths.get((share * last as f64) as usize).copied().unwrap_or(0.0)
-        };
+        let depth = quantiles(&mut self.depths, [0.0, 0.5, 1.0]);
+        let hit_distance = quantiles(&mut self.hit_distances, [0.25, 0.5, 1.0]);
         let mean_radiance = self.radiance_sum / surfaces.max(1) as f64;
         let is_firefly = |value: &&f32| f64::from(**value) > 50.0 * mean_radiance;
         Content {
@@ -175,9 +176,17 @@ impl Gatherer {
             mean_radiance,
             largest_radiance: self.largest_radiance,
             fireflies: of(self.radiance.iter().filter(is_firefly).count(), self.radiance.len()),
-            depth: [at(0.0), at(0.5), at(1.0)],
+            depth,
+            hit_distance,
         }
     }
+}
+
+/// Values below which given shares lie; 0 where there are none.
+fn quantiles<const N: usize>(values: &mut [f32], shares: [f64; N]) -> [f32; N] {
+    values.sort_by(f32::total_cmp);
+    let last = values.len().saturating_sub(1) as f64;
+    shares.map(|share| values.get((share * last) as usize).copied().unwrap_or(0.0))
 }
 
 impl fmt::Display for Content {
@@ -202,6 +211,10 @@ impl fmt::Display for Content {
             percent(self.fireflies)
         )?;
         let (missing, misses) = (percent(self.hit_distance_missing), percent(self.misses));
-        writeln!(f, "  hit distance {missing} of surfaces have none, {misses} of rays leave the scene")
+        let [_, half, most] = self.hit_distance;
+        writeln!(
+            f,
+            "  hit distance median {half:.3}, up to {most:.3}; {missing} have none, {misses} of rays leave the scene"
+        )
     }
 }

@@ -3,10 +3,11 @@
 
 use std::fmt;
 
-use glam::{Mat3, Mat4, UVec2, Vec2, Vec3, Vec4};
+use glam::{Mat3, Mat4, UVec2, Vec2, Vec3};
 use limpid::Camera;
 use serde::Serialize;
 
+use super::conform::FLIPPED;
 use super::percent;
 use crate::sequence::Frame;
 
@@ -62,6 +63,35 @@ const NORMALS: [NormalMeaning; 5] = [
     NormalMeaning::Inward,
 ];
 
+/// Whose view matrices those of `camera.json` are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MatrixTiming {
+    /// Of their own frame.
+    Own,
+    /// Of the frame before.
+    FrameBefore,
+    /// Of the frame after.
+    FrameAfter,
+}
+
+/// Median distances between stored unit normals and those of the surface that the depth describes; about radians.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Apart {
+    /// As limpid takes both.
+    pub own: f64,
+    /// With the normals taken for view-space ones.
+    pub view: f64,
+    /// Of surfaces that the camera turns against: with their own view matrix, that of the frame before, and that of the
+    /// frame after.
+    pub turned: Option<[f64; 3]>,
+}
+
+/// Whether a distance is clearly below another. Below a tenth of a degree it is that of rounding.
+fn is_clearly_below(distance: f64, other: f64) -> bool {
+    other > 2e-3 && distance < 0.4 * other
+}
+
 /// How well depth and normals fit each other.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Geometry {
@@ -75,6 +105,10 @@ pub struct Geometry {
     pub best_agreement: f64,
     /// Whether clip space looks as if it had `y` down.
     pub y_down: bool,
+    /// Whose view matrices turn normals of the depth into those that are stored.
+    pub matrices: MatrixTiming,
+    /// Median distance between stored normals and those of the depth.
+    pub apart: Apart,
 }
 
 /// Cosine from which two normals agree: bumps and curved surfaces are allowed for.
@@ -88,6 +122,10 @@ pub(super) struct Gatherer {
     agreeing: [[usize; NORMALS.len()]; DEPTHS.len()],
     /// With `y` of clip space the other way.
     agreeing_y_down: usize,
+    /// Stored normal in world space and that of the depth in view space, of the last frame, with its matrix.
+    last: Option<(Mat3, Vec<[Vec3; 2]>)>,
+    /// Distances between stored normals and those of the depth: own, view; own, before and after of what turned.
+    distances: [Vec<f32>; 5],
 }
 
 /// Position in view space of a pixel with a depth, `None` if there is none.
@@ -113,9 +151,6 @@ pub(super) fn view_position(
     }
 }
 
-/// Turns `y` of clip space around.
-const FLIPPED: Mat4 = Mat4::from_cols(Vec4::X, Vec4::NEG_Y, Vec4::Z, Vec4::W);
-
 /// Normal in view space, towards the camera, of the surface through a pixel's place and those right of and below it.
 /// `None` across an edge, where there is no surface.
 fn surface_normal([center, right, below]: [Vec3; 3]) -> Option<Vec3> {
@@ -127,11 +162,31 @@ fn surface_normal([center, right, below]: [Vec3; 3]) -> Option<Vec3> {
     Some(if normal.dot(center) > 0.0 { -normal } else { normal })
 }
 
+/// The same as of neighbours on both sides, which is right of curved surfaces too. Not for pixels at the border.
+fn smooth_normal(frame: &Frame, inverse_projection: &Mat4, pixel: UVec2) -> Option<Vec3> {
+    let position = |dx: i32, dy: i32| {
+        let at = pixel.as_ivec2() + glam::IVec2::new(dx, dy);
+        let depth = frame.depth[(at.y * frame.size.x as i32 + at.x) as usize];
+        let meaning = DepthMeaning::Linear;
+        let place = view_position(&frame.camera, inverse_projection, frame.size, at.as_vec2(), depth, meaning);
+        place.filter(|_| depth > 0.0)
+    };
+    let center = position(0, 0)?;
+    let [left, right, above, below] = [position(-1, 0)?, position(1, 0)?, position(0, -1)?, position(0, 1)?];
+    let is_edge = |other: Vec3| (other.length() / center.length() - 1.0).abs() > 0.05;
+    if [left, right, above, below].into_iter().any(is_edge) {
+        return None;
+    }
+    let normal = (right - left).cross(below - above).normalize_or_zero();
+    Some(if normal.dot(center) > 0.0 { -normal } else { normal })
+}
+
 impl Gatherer {
     pub(super) fn add(&mut self, frame: &Frame) {
         let size = frame.size;
         let inverse_projection = frame.camera.view_to_clip.inverse();
         let view_to_world = Mat3::from_mat4(frame.camera.world_to_view).transpose();
+        let mut pairs = Vec::new();
         let rows = (1..size.y.saturating_sub(1)).step_by(STRIDE);
         for pixel in rows.flat_map(|y| (1..size.x.saturating_sub(1)).step_by(STRIDE).map(move |x| UVec2::new(x, y))) {
             let at = |dx: u32, dy: u32| ((pixel.y + dy) * size.x + pixel.x + dx) as usize;
@@ -160,12 +215,47 @@ impl Gatherer {
                     self.agreeing[d][n] += usize::from(agrees(*candidate, normal));
                 }
             }
+            pairs.extend(smooth_normal(frame, &inverse_projection, pixel).map(|normal| [candidates[0], normal]));
             let y_down = surface(DepthMeaning::Linear, &(inverse_projection * FLIPPED));
             self.agreeing_y_down += usize::from(y_down.is_some_and(|normal| agrees(candidates[0], normal)));
         }
+        self.add_distances(frame.reset, view_to_world, pairs);
     }
 
-    pub(super) fn finish(self) -> Geometry {
+    /// `pairs` are normals as stored and those of the depth in view space. With matrices that come a frame late, this
+    /// frame's are those of the images before, and the other way round.
+    fn add_distances(&mut self, reset: bool, matrix: Mat3, pairs: Vec<[Vec3; 2]>) {
+        let distances = |matrix: Mat3, pairs: &[[Vec3; 2]]| -> Vec<f32> {
+            pairs.iter().map(|[stored, surface]| stored.distance(matrix * *surface)).collect()
+        };
+        self.distances[0].extend(distances(matrix, &pairs));
+        self.distances[1].extend(distances(Mat3::IDENTITY, &pairs));
+        if let Some((last_matrix, last)) = self.last.take().filter(|_| !reset) {
+            // The ground says nothing of a camera that turns about what is upright.
+            let turned = |pairs: &[[Vec3; 2]]| -> Vec<[Vec3; 2]> {
+                let turns = |[_, n]: &&[Vec3; 2]| (matrix * *n).distance(last_matrix * *n) > 2e-3;
+                pairs.iter().filter(turns).copied().collect()
+            };
+            let (now, last) = (turned(&pairs), turned(&last));
+            self.distances[2].extend(distances(matrix, &now));
+            self.distances[3].extend(distances(matrix, &last));
+            self.distances[4].extend(distances(last_matrix, &now));
+        }
+        self.last = Some((matrix, pairs));
+    }
+
+    fn apart(&mut self) -> Apart {
+        let enough = self.distances[2..].iter().all(|values| values.len() > 50);
+        let median = |values: &mut Vec<f32>| {
+            values.sort_by(f32::total_cmp);
+            values.get(values.len() / 2).map_or(0.0, |&value| f64::from(value))
+        };
+        let [own, view, turned @ ..] = self.distances.each_mut().map(median);
+        Apart { own, view, turned: enough.then_some(turned) }
+    }
+
+    pub(super) fn finish(mut self) -> Geometry {
+        let apart = self.apart();
         // Of all samples, so that a meaning does not win by making an edge of everything.
         let agreement = |d: usize, n: usize| self.agreeing[d][n] as f64 / self.samples.max(1) as f64;
         let (mut best, mut best_agreement) = (EXPECTED, agreement(0, 0));
@@ -182,7 +272,18 @@ impl Gatherer {
         if y_down {
             (best, best_agreement) = (EXPECTED, y_down_agreement);
         }
-        Geometry { samples: self.samples, agreement: agreement(0, 0), best, best_agreement, y_down }
+        // A camera that looks nearly along an axis turns normals by too little for shares to tell.
+        if best == EXPECTED && !y_down && is_clearly_below(apart.view, apart.own) {
+            (best, best_agreement) = (Meaning { normal: NormalMeaning::View, ..EXPECTED }, agreement(0, 1));
+        }
+        let [own, before, after] = apart.turned.filter(|_| best == EXPECTED && !y_down).unwrap_or_default();
+        let matrices = match (is_clearly_below(before, own), is_clearly_below(after, own)) {
+            (true, _) if before <= after => MatrixTiming::FrameBefore,
+            (_, true) => MatrixTiming::FrameAfter,
+            (true, _) => MatrixTiming::FrameBefore,
+            _ => MatrixTiming::Own,
+        };
+        Geometry { samples: self.samples, agreement: agreement(0, 0), best, best_agreement, y_down, matrices, apart }
     }
 }
 

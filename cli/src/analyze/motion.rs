@@ -5,7 +5,6 @@ use std::fmt;
 
 use glam::{DVec3, Mat4, UVec2, Vec2, Vec3};
 use limpid::Camera;
-use limpid::settings::Conventions;
 use serde::Serialize;
 
 use super::geometry::{DepthMeaning, view_position};
@@ -33,20 +32,26 @@ pub struct Motion {
     pub moving: f64,
     /// Mean mismatch of surfaces where the motion vectors lead, 0 to 1.
     pub mismatch: f64,
+    /// The same of those that move.
+    pub moving_mismatch: f64,
     /// The factor on motion vectors that fits best, over the one in the settings.
     pub best_factor: Vec2,
-    /// Its mismatch.
+    /// The mismatch, with it, of those that move.
     pub best_mismatch: f64,
     /// Median distance between where motion vectors lead and where the cameras say, in pixels, for moving cameras.
     pub camera_residual: Option<f64>,
     /// What the matrices mean if that fits better.
     pub camera: CameraMeaning,
+    /// Whether any camera differs from the one before, cuts aside.
+    pub camera_moves: bool,
     /// Surfaces that move by more than a pixel beyond what the camera does.
     pub object_motion: f64,
     /// Whether cameras are jittered.
     pub has_jitter: bool,
     /// Whether motion vectors contain the difference of the jitter.
     pub includes_jitter: bool,
+    /// Frames that begin anew, marked as reset, but for the first.
+    pub cuts: Vec<u32>,
     /// Frames that continue nothing and are not marked as reset.
     pub unmarked_cuts: Vec<u32>,
     /// Frames that are marked as reset and continue the one before.
@@ -69,17 +74,30 @@ struct Sums {
     count: usize,
 }
 
+impl Sums {
+    fn add(&mut self, mismatch: f64) {
+        self.mismatch += mismatch;
+        self.count += 1;
+    }
+
+    fn mean(&self) -> f64 {
+        self.mismatch / self.count.max(1) as f64
+    }
+}
+
 /// Surfaces of a frame whose motion tells one convention from another.
 pub(super) struct Gatherer {
     factors: Vec<Vec2>,
     samples: usize,
     moving: usize,
-    sums: Vec<Sums>,
+    /// Of all surfaces, for each factor, and of those that move: what rests fits whatever the factor.
+    sums: [Vec<Sums>; 2],
     camera_residuals: [Vec<f32>; CAMERAS.len()],
     jittered_residuals: Vec<f32>,
     has_jitter: bool,
     camera_moves: bool,
     object_motion: usize,
+    cuts: Vec<u32>,
     unmarked_cuts: Vec<u32>,
     needless_resets: Vec<u32>,
 }
@@ -91,13 +109,13 @@ struct Sample {
     motion: Vec2,
 }
 
-fn samples(frame: &Frame, conventions: &Conventions) -> Vec<Sample> {
+fn samples(frame: &Frame) -> Vec<Sample> {
     let stride = ((frame.size.element_product() / SAMPLES) as f32).sqrt().max(1.0) as u32;
     let mut samples = Vec::new();
     for y in (stride / 2..frame.size.y).step_by(stride as usize) {
         for x in (stride / 2..frame.size.x).step_by(stride as usize) {
             let i = (y * frame.size.x + x) as usize;
-            let motion = Vec2::from(frame.motion[i]) * conventions.motion_scale;
+            let motion = Vec2::from(frame.motion[i]);
             if frame.depth[i].is_finite() && frame.depth[i] > 0.0 && motion.is_finite() {
                 let pixel = UVec2::new(x, y);
                 samples.push(Sample { pixel, uv: (pixel.as_vec2() + 0.5) / frame.size.as_vec2(), motion });
@@ -165,7 +183,7 @@ impl Gatherer {
     pub(super) fn new(size: UVec2) -> Self {
         let factors = factors(size);
         Self {
-            sums: factors.iter().map(|_| Sums::default()).collect(),
+            sums: [(); 2].map(|()| factors.iter().map(|_| Sums::default()).collect()),
             factors,
             samples: 0,
             moving: 0,
@@ -174,13 +192,14 @@ impl Gatherer {
             has_jitter: false,
             camera_moves: false,
             object_motion: 0,
+            cuts: Vec::new(),
             unmarked_cuts: Vec::new(),
             needless_resets: Vec::new(),
         }
     }
 
-    pub(super) fn add(&mut self, previous: &Frame, frame: &Frame, conventions: &Conventions) {
-        let samples = samples(frame, conventions);
+    pub(super) fn add(&mut self, previous: &Frame, frame: &Frame) {
+        let samples = samples(frame);
         let inverse_projections = [frame.camera.view_to_clip.inverse(), previous.camera.view_to_clip.inverse()];
         let [now, before] = &inverse_projections;
         let jitter = (frame.camera.jitter - previous.camera.jitter) / frame.size.as_vec2();
@@ -192,6 +211,9 @@ impl Gatherer {
             self.factors.iter().map(|&factor| samples.iter().map(|sample| look_up(sample, factor)).collect()).collect();
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
         let best = mismatches.iter().map(|values| mean(values)).fold(f64::INFINITY, f64::min);
+        if frame.reset {
+            self.cuts.push(frame.number);
+        }
         // Whatever the convention, nothing fits.
         let is_cut = samples.len() > 50 && best > 0.75;
         match (is_cut, frame.reset) {
@@ -203,14 +225,19 @@ impl Gatherer {
             return;
         }
         self.samples += samples.len();
-        for (sums, values) in self.sums.iter_mut().zip(&mismatches) {
-            sums.mismatch += values.iter().sum::<f64>();
-            sums.count += values.len();
+        let moves = |sample: &Sample| (sample.motion * frame.size.as_vec2()).length() > 0.5;
+        let [all, moving] = &mut self.sums;
+        for ((all, moving), values) in all.iter_mut().zip(moving).zip(&mismatches) {
+            for (sample, value) in samples.iter().zip(values) {
+                all.add(*value);
+                if moves(sample) {
+                    moving.add(*value);
+                }
+            }
         }
         self.camera_moves |= frame.camera.world_to_view != previous.camera.world_to_view;
         for sample in &samples {
-            let pixels = (sample.motion * frame.size.as_vec2()).length();
-            self.moving += usize::from(pixels > 0.5);
+            self.moving += usize::from(moves(sample));
             self.add_residuals(previous, frame, sample, jitter);
         }
     }
@@ -234,15 +261,23 @@ impl Gatherer {
     }
 
     pub(super) fn finish(mut self) -> Motion {
-        let mean = |sums: &Sums| sums.mismatch / sums.count.max(1) as f64;
-        let mismatch = mean(&self.sums[0]);
-        let (mut best, mut best_mismatch) = (0, mismatch);
-        for (index, sums) in self.sums.iter().enumerate() {
-            // Others have to be clearly better.
-            if mean(sums) < best_mismatch && mean(sums) < 0.8 * mismatch - 0.005 {
-                (best, best_mismatch) = (index, mean(sums));
-            }
-        }
+        let [all, moving] = &self.sums;
+        let least =
+            |sums: &[Sums]| (0..sums.len()).min_by(|&a, &b| sums[a].mean().total_cmp(&sums[b].mean())).unwrap_or(0);
+        // Others have to be clearly better; where little moves, by far, since things that move lie elsewhere anyway.
+        let (best_of_all, best_of_moving) = (least(all), least(moving));
+        let mismatch = all[0].mean();
+        let best = if all[best_of_all].mean() < 0.8 * mismatch - 0.005 {
+            best_of_all
+        } else if moving[0].count > 50
+            && moving[0].mean() > 0.5
+            && moving[best_of_moving].mean() < 0.5 * moving[0].mean()
+        {
+            best_of_moving
+        } else {
+            0
+        };
+        let [moving_mismatch, best_mismatch] = [0, best].map(|index| moving[index].mean());
         let median = |values: &mut Vec<f32>| {
             values.sort_by(f32::total_cmp);
             values.get(values.len() / 2).map(|&value| f64::from(value))
@@ -258,6 +293,7 @@ impl Gatherer {
             samples: self.samples,
             moving: share(self.moving),
             mismatch,
+            moving_mismatch,
             best_factor: self.factors[best],
             best_mismatch,
             camera_residual: expected.filter(|_| self.camera_moves),
@@ -266,6 +302,8 @@ impl Gatherer {
             has_jitter: self.has_jitter,
             includes_jitter: self.has_jitter
                 && expected.zip(jittered).is_some_and(|(plain, jittered)| jittered < 0.5 * plain),
+            camera_moves: self.camera_moves,
+            cuts: self.cuts,
             unmarked_cuts: self.unmarked_cuts,
             needless_resets: self.needless_resets,
         }
@@ -279,9 +317,14 @@ impl fmt::Display for Motion {
         }
         let (moving, objects) = (percent(self.moving), percent(self.object_motion));
         writeln!(f, "  motion       {moving} of surfaces move, {objects} not just with the camera")?;
+        let camera = if self.camera_moves { "moves" } else { "rests" };
+        let jitter = if self.has_jitter { "with jitter" } else { "without jitter" };
+        let cuts: Vec<_> = self.cuts.iter().map(u32::to_string).collect();
+        let cuts = if cuts.is_empty() { "no cuts".to_owned() } else { format!("cuts at {}", cuts.join(", ")) };
+        writeln!(f, "  camera       {camera}, {jitter}, {cuts}")?;
         writeln!(f, "  history      {} of surfaces are found where motion vectors lead", percent(1.0 - self.mismatch))?;
         if let Some(residual) = self.camera_residual {
-            writeln!(f, "  cameras      {residual:.2} pixels from the motion vectors, at the median")?;
+            writeln!(f, "               {residual:.2} pixels from the motion vectors, at the median")?;
         }
         Ok(())
     }

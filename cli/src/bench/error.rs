@@ -97,7 +97,7 @@ impl Values {
 }
 
 /// Kinds of pixels in which errors differ, by the name of their metric.
-const REGIONS: [&str; 4] = ["disocclusion", "mirror", "rough", "firefly"];
+pub const REGIONS: [&str; 4] = ["disocclusion", "mirror", "rough", "firefly"];
 
 /// For each pixel the regions that it belongs to, a bit for each.
 #[derive(Clone, Debug)]

@@ -33,7 +33,8 @@ fn pareto(report: &Report, sequence: Option<&SequenceInfo>) -> Plot {
         (!points.is_empty()).then_some(Series { name, style: Style::Points, points })
     });
     let baselines = [NOISY, ACCUMULATION].into_iter().filter_map(|name| Some((name.to_owned(), psnr(name)?)));
-    let limit = sequence.and_then(|sequence| sequence.limit).map(|limit| ("reference's own noise".to_owned(), limit));
+    let limit =
+        sequence.and_then(|sequence| sequence.limit).map(|limit| ("noise of the converged image".to_owned(), limit));
     let of = sequence.map_or("all sequences", |sequence| sequence.name.as_str());
     Plot {
         title: format!("Error against run time, {of}"),

@@ -10,6 +10,7 @@ pub mod counts;
 pub mod error;
 mod figures;
 pub mod history;
+mod markdown;
 pub mod measure;
 mod page;
 mod plot;
@@ -23,6 +24,7 @@ pub mod variant;
 pub mod yardstick;
 
 pub use figures::figures;
+pub use markdown::markdown;
 pub use page::page;
 pub use record::{Config, Report, Run};
 pub use subject::Subject;

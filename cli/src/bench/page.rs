@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::error::{METRICS, Values};
+use super::error::{METRICS, REGIONS, Values};
 use super::figures;
 use super::plot::{escape, short};
 use super::record::{Report, VariantInfo};
@@ -276,17 +276,39 @@ fn recovery(report: &Report) -> String {
     )
 }
 
+/// Errors by kind of pixel, of all but ablations.
+fn regions(report: &Report) -> String {
+    let shown = || report.variants.iter().map(|info| &info.variant).filter(|v| v.group != Group::Ablation);
+    let meaning = |name: &str| METRICS.iter().find(|metric| metric.name == name).map_or("", |metric| metric.meaning);
+    let mut header = plain(&["sequence", "variant"]);
+    header.extend(REGIONS.map(|name| (name.to_owned(), meaning(name).to_owned())));
+    let rows: Vec<_> = report
+        .sequences
+        .iter()
+        .flat_map(|sequence| shown().filter_map(|variant| report.run(&sequence.name, &variant.name)))
+        .map(|run| {
+            let names = [escape(&run.sequence), escape(&run.variant)];
+            names.into_iter().chain(REGIONS.map(|name| number(run.mean.get(name)))).collect()
+        })
+        .collect();
+    format!(
+        "<h2>Error by kind of pixel</h2><p class=note>Root mean squared error where the surface was just uncovered, on \
+         mirrors, on rough surfaces, and beside fireflies of the input. A dash where a sequence has no such pixels; their \
+         shares are in the table of sequences below.</p>{}",
+        table(&header, &rows)
+    )
+}
+
 fn sequences(report: &Report) -> String {
-    let mut header = plain(&["sequence", "size", "frames", "reference's own PSNR"]);
-    let regions = ["disocclusion", "mirror", "rough", "firefly"];
-    header.extend(regions.map(|name| (format!("{name} %"), "share of pixels".to_owned())));
+    let mut header = plain(&["sequence", "size", "frames", "PSNR of the converged image"]);
+    header.extend(REGIONS.map(|name| (format!("{name} %"), "share of pixels".to_owned())));
     let rows: Vec<_> = report
         .sequences
         .iter()
         .map(|s| {
             let size = format!("{}x{}", s.size.x, s.size.y);
             let mut row = vec![escape(&s.name), size, s.frames.to_string(), number(s.limit)];
-            row.extend(regions.map(|name| s.shares.get(name).map_or_else(String::new, |share| short(share * 100.0))));
+            row.extend(REGIONS.map(|name| s.shares.get(name).map_or_else(String::new, |share| short(share * 100.0))));
             row
         })
         .collect();
@@ -311,7 +333,11 @@ pub fn page(report: &Report, pictures: &[(String, Vec<u8>)]) -> String {
         let shown = all.iter().filter(|(name, _)| name.starts_with(prefix)).map(|(_, svg)| svg.as_str());
         format!("<div class=figures>{}</div>\n", shown.collect::<String>())
     };
-    html = html + "<h2>Error against run time</h2>" + &show("pareto") + &overview(report) + &ablations(report);
+    html = html + "<h2>Error against run time</h2>" + &show("pareto");
+    html += "<p class=note>Means over all sequences but `events`, which is for recovery. `reference` is the preset, not the \
+             converged image.</p>";
+    html = html + &overview(report);
+    html = html + &regions(report) + &ablations(report);
     html = html + "<h2>Convergence</h2>" + &show("convergence") + &recovery(report) + &show("recovery");
     html = html + "<h2>Scaling</h2>" + &show("scaling");
     html += "<h2>Costs that are the same everywhere</h2><p class=note>Of a frame in which every pixel is denoised. \

@@ -94,7 +94,7 @@ fn event_list() -> Vec<Event> {
 }
 
 impl Subject {
-    fn new(name: &str, exposure: f32, frames: Vec<Frame>, events: Vec<Event>, limit: Option<f64>) -> Self {
+    pub(crate) fn new(name: &str, exposure: f32, frames: Vec<Frame>, events: Vec<Event>, limit: Option<f64>) -> Self {
         let regions = (0..frames.len())
             .map(|index| {
                 let previous = index.checked_sub(1).map(|index| &frames[index]);

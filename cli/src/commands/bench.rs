@@ -24,7 +24,7 @@ use crate::bench::scaling::{Sizes, scaling};
 use crate::bench::subject::{self, Rendering};
 use crate::bench::variant::{Group, REFERENCE, Variant};
 use crate::bench::yardstick::Yardstick;
-use crate::bench::{Config, Report, Subject, figures, page, table};
+use crate::bench::{Config, Report, Subject, figures, markdown, page, table};
 use crate::cost::{Driver, Job};
 use crate::picture;
 use crate::scene;
@@ -32,8 +32,8 @@ use crate::sequence::{ChannelNames, write_atomically};
 
 /// Measures error against run time, over presets, settings and features, and writes a report.
 ///
-/// Writes to the output folder: report.html (everything, loads nothing), bench.json, bench.csv, figures/*.svg and
-/// pictures/*.png. Ctrl-C keeps what is finished; --resume goes on.
+/// Writes to the output folder: report.html (everything, loads nothing), bench.json, bench.csv, measured.md (tables),
+/// figures/*.svg and pictures/*.png. Ctrl-C keeps what is finished; --resume goes on.
 #[derive(Debug, Args)]
 pub(super) struct Bench {
     /// Built-in scene, or `events`, in which things change suddenly. Can be given more than once; all of them if
@@ -324,6 +324,7 @@ impl Bench {
                 sizes => Sizes::Exactly(sizes),
             };
             let first = subject.frames.len().min(2);
+            eprintln!("timing {} over image sizes and shares of tiles", variant.name);
             let points = scaling(choice, &variant, &subject.frames[..first], sizes, &interrupt::requested)?;
             // Half a curve would pass for a whole one.
             if !interrupt::requested() {
@@ -352,6 +353,7 @@ impl Bench {
     fn finish(&self, report: &Report) -> Result<()> {
         self.save(report)?;
         write(&self.out.join("bench.csv"), table::csv(report).as_bytes())?;
+        write(&self.out.join("measured.md"), markdown(report).as_bytes())?;
         for (name, svg) in figures(report) {
             write(&self.out.join("figures").join(format!("{name}.svg")), svg.as_bytes())?;
         }

@@ -35,6 +35,9 @@ pub(super) struct Stability {
     /// Write a picture of how near every verdict came to its limit.
     #[arg(long, value_name = "FILE.svg", conflicts_with = "probe")]
     figure: Option<PathBuf>,
+    /// Write a Markdown table of what passed, by group.
+    #[arg(long, value_name = "FILE.md", conflicts_with = "probe")]
+    table: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -106,9 +109,10 @@ impl Stability {
         }
         progress.finish_and_clear();
         super::print(&if self.json { serde_json::to_string_pretty(&report)? + "\n" } else { report.to_string() })?;
-        if let Some(path) = &self.figure {
-            let svg = figure::svg(&report);
-            write_atomically(path, |file| std::io::Write::write_all(file, svg.as_bytes()))
+        let figure = self.figure.as_ref().map(|path| (path, figure::svg(&report)));
+        let table = self.table.as_ref().map(|path| (path, report.markdown()));
+        for (path, text) in [figure, table].into_iter().flatten() {
+            write_atomically(path, |file| std::io::Write::write_all(file, text.as_bytes()))
                 .with_context(|| format!("cannot write {}", path.display()))?;
         }
         match report.failures().count() {

@@ -69,6 +69,25 @@ impl Report {
         super::known::repaired(&self.verdicts)
     }
 
+    /// A row for each group in Markdown, as docs/stability.md has it.
+    pub fn markdown(&self) -> String {
+        let mut text = "| group | cases | verdicts | passed | known failures |\n|---|---|---|---|---|\n".to_owned();
+        let cases = self.cases();
+        let mut groups: Vec<&str> = cases.iter().map(|(group, _)| *group).collect();
+        groups.dedup();
+        let row = |name: &str, cases: usize, verdicts: &[&Verdict]| {
+            let passed = verdicts.iter().filter(|verdict| verdict.passed).count();
+            let known = verdicts.iter().filter(|verdict| !verdict.passed && verdict.known.is_some()).count();
+            let known = if known > 0 { known.to_string() } else { String::new() };
+            format!("| {name} | {cases} | {} | {passed} | {known} |\n", verdicts.len())
+        };
+        for group in groups {
+            let of_group: Vec<&Verdict> = self.verdicts.iter().filter(|verdict| verdict.group == group).collect();
+            text += &row(group, cases.iter().filter(|(other, _)| *other == group).count(), &of_group);
+        }
+        text + &row("all", cases.len(), &self.verdicts.iter().collect::<Vec<_>>())
+    }
+
     /// Names of cases in order.
     fn cases(&self) -> Vec<(&str, &str)> {
         let mut cases: Vec<(&str, &str)> = Vec::new();
