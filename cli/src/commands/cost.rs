@@ -7,7 +7,7 @@ use clap::Args;
 use limpid::kernel::Sources;
 
 use super::settings::SettingsOptions;
-use crate::cost::{Cost, Driver, GENERATIONS, Job, on_this_device, table};
+use crate::cost::{Cost, Driver, GENERATIONS, Job, on_this_device, table, traffic};
 
 /// Prints what the compilers of GPUs make of each pass, without those GPUs.
 ///
@@ -47,13 +47,14 @@ impl CostCommand {
     }
 
     pub(super) fn run(&self) -> Result<()> {
+        let traffic = traffic(&self.settings.load()?)?;
         if self.this_device {
             let sources = self.kernels.clone().map_or(Sources::BuiltIn, Sources::Folder);
             let cost = on_this_device(&self.settings.load()?, &sources)?;
-            let text = if self.json { serde_json::to_string_pretty(&cost)? + "\n" } else { table(&[cost]) };
+            let text = if self.json { serde_json::to_string_pretty(&cost)? + "\n" } else { table(&[cost]) + &traffic };
             return super::print(&text);
         }
         let costs = self.costs()?;
-        super::print(&if self.json { serde_json::to_string_pretty(&costs)? + "\n" } else { table(&costs) })
+        super::print(&if self.json { serde_json::to_string_pretty(&costs)? + "\n" } else { table(&costs) + &traffic })
     }
 }

@@ -15,7 +15,7 @@ use limpid_ash::offscreen::{Context, ContextOptions};
 use serde::{Deserialize, Serialize};
 
 pub use radv::{Driver, GENERATIONS, Generation, Job};
-pub use table::table;
+pub use table::{table, traffic};
 
 /// What compilers make of the passes of some settings, on one GPU.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,6 +1,10 @@
 //! Costs for people to read.
 
+use glam::UVec2;
+use limpid::Settings;
+
 use super::{Cost, GENERATIONS, PassCost};
+use crate::bench::counts::Counts;
 
 /// Title of a column, and the statistics whose sum it shows, as RADV names them.
 const COLUMNS: &[(&str, &[&str])] = &[
@@ -58,6 +62,29 @@ pub fn table(costs: &[Cost]) -> String {
         }
     }
     aligned(&rows) + &legend(costs)
+}
+
+/// Bandwidths of GPUs that share memory with a CPU, of mid-range and of large ones, in bytes a second.
+const BANDWIDTHS: [f64; 3] = [100e9, 300e9, 900e9];
+
+/// What the passes move through memory, and the least time that takes.
+///
+/// # Errors
+///
+/// As [`limpid::Plan::new`].
+pub fn traffic(settings: &Settings) -> Result<String, limpid::Error> {
+    let size = UVec2::new(1920, 1080);
+    let counts = Counts::new(settings, size)?;
+    let bytes = (counts.bytes_read + counts.bytes_written) * f64::from(size.x) * f64::from(size.y);
+    let times = BANDWIDTHS.map(|rate| format!("{:.2} ms at {:.0} GB/s", bytes / rate * 1e3, rate / 1e9));
+    Ok(format!(
+        "Each pixel reads {:.1} bytes and writes {:.1}: at {}x{} at least {}.\n",
+        counts.bytes_read,
+        counts.bytes_written,
+        size.x,
+        size.y,
+        times.join(", ")
+    ))
 }
 
 /// What the names of GPUs stand for.
