@@ -3,7 +3,6 @@
 
 use std::cell::RefCell;
 
-use limpid::settings::Pipeline;
 use limpid_harness::executor::Cpu;
 use limpid_harness::strategy::any_spec;
 use limpid_harness::{Snapshot, Table, executors, half_steps, runner};
@@ -60,10 +59,7 @@ fn devices_differ_by_what_vulkan_lets_them() {
     let all = RefCell::new(executors().into_iter().filter(|executor| executor.backend() == "ash").collect::<Vec<_>>());
     let count = RefCell::new(Count::default());
     let (mut runner, cases) = runner(file!(), 60);
-    let result = runner.run(&any_spec(), |mut spec| {
-        // What the other pipeline's devices differ by has not been traced yet.
-        spec.settings.pipeline = Pipeline::Published;
-        spec.later_settings = None;
+    let result = runner.run(&any_spec(), |spec| {
         let case = spec.case();
         let exact = case.run(&mut Cpu::new());
         let inexact: Vec<_> = (0..SEEDS).map(|seed| case.run(&mut Cpu::inexact(seed))).collect();
