@@ -30,7 +30,7 @@ fn assert_same(replaced: impl Fn(&Kernel) -> Kernel) {
         let replacements = kernels.iter().map(&replaced).collect();
         let expected = case.run(&mut Cpu::new());
         let found = case.run_plan(&mut Cpu::new(), Denoiser::with_plan(&case.settings, plan, replacements));
-        frames::assert_same(&name, &expected, &found, 0);
+        frames::assert_same(&name, &expected, &found);
     }
 }
 

@@ -76,8 +76,9 @@ struct Plane {
 }
 
 fn plane_of(guide: Guide, position: vec3<f32>) -> Plane {
-    // Of surfaces that are next to nothing away it would be infinite.
-    let tolerance = 1.0 / (PLANE_TOLERANCE * max(guide.depth, 1e-30));
+    // Of surfaces that are next to nothing away it would be infinite. A quotient of constants, as DXC makes one of
+    // 1 / (PLANE_TOLERANCE * depth), which rounds otherwise.
+    let tolerance = (1.0 / PLANE_TOLERANCE) / max(guide.depth, 1e-30);
     let offset = vec4<f32>(0.0, 0.0, 0.0, dot(guide.normal, position));
     let lobe = 1.0 / max(alpha_of(guide.roughness), NORMAL_TOLERANCE);
     var plane: Plane;

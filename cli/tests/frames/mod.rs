@@ -29,14 +29,14 @@ pub(crate) fn case(settings: &Settings, frames: impl Iterator<Item = Frame>) -> 
     Case { settings, size: steps[0].images.size, steps }
 }
 
-/// Compares what two runs of a case left in memory; so many words of a resource may differ.
-pub(crate) fn assert_same(name: &str, expected: &[Snapshot], found: &[Snapshot], allowed: usize) {
+/// Compares what two runs of a case left in memory: every word is the same.
+pub(crate) fn assert_same(name: &str, expected: &[Snapshot], found: &[Snapshot]) {
     for (number, (expected, found)) in expected.iter().zip(found).enumerate() {
         assert!(expected.0["output"].iter().any(|&word| word != 0), "{name}, frame {number}: nothing but zeros");
         for (resource, words) in &expected.0 {
             let differing = words.iter().zip(&found.0[resource]).filter(|(a, b)| a != b).count();
             let count = words.len();
-            assert!(differing <= allowed, "{name}, frame {number}: {differing} of {count} words of {resource}");
+            assert!(differing == 0, "{name}, frame {number}: {differing} of {count} words of {resource}");
         }
     }
 }

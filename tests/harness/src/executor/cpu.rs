@@ -73,7 +73,12 @@ impl Executor for Cpu {
     }
 
     fn set_settings(&mut self, settings: &Settings) {
-        self.denoiser.as_mut().unwrap().set_settings(settings).unwrap();
+        let denoiser = self.denoiser.as_mut().unwrap();
+        denoiser.set_settings(settings).unwrap();
+        // Kernels that settings change are made anew.
+        if let Some(seed) = self.inexact {
+            denoiser.make_inexact(seed);
+        }
     }
 
     fn frame(&mut self, images: &[Image], frame: &FrameInputs) -> Snapshot {
