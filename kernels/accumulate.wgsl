@@ -217,39 +217,82 @@ fn surface_prev_uv(pixel: vec2<u32>) -> vec2<f32> {
     return select(vec2<f32>(-4.0), clamp(uv, vec2<f32>(-4.0), vec2<f32>(4.0)), usable);
 }
 
-// History by both motions, its length bounded by what it is worth.
-fn find_history(pixel: vec2<u32>, guide: Guide, position: vec3<f32>, share: f32, is_rare: bool, around: Surroundings) -> Found {
-    let r = guide.roughness;
-    let size = vec2<f32>(frame.size);
-    let static_uv = prev_uv_of(position);
+// A pixel, and this frame's sample of it.
+struct Subject {
+    guide: Guide,
+    position: vec3<f32>,
+    around: Surroundings,
+    // Exposed.
+    radiance: vec3<f32>,
+    // Hit share.
+    share: f32,
+}
+
+fn subject_of(pixel: vec2<u32>, guide: Guide) -> Subject {
+    let position = world_position(pixel, guide.depth);
+    let around = surroundings_of(pixel, plane_of(guide, position));
+    let distance = usable_hit_distance(textureLoad(in_radiance, pixel, 0).a);
+    let own_share = select(around.share, hit_share(distance, camera_distance_of(position)), distance > 0.0);
+    // Single hit distances of rough surfaces say little, and go with the colour of their sample.
+    let share = mix(own_share, around.share, smoothstep(0.03, 0.2, guide.roughness) * around.fit);
+    return Subject(guide, position, around, sample_of(pixel, guide, around), share);
+}
+
+// The two histories that a pixel can have, and where they were last frame.
+struct Candidates {
+    surface_uv: vec2<f32>,
+    surface: Found,
+    reflection_uv: vec2<f32>,
+    reflection: Found,
+}
+
+fn candidates_of(pixel: vec2<u32>, subject: Subject) -> Candidates {
+    let r = subject.guide.roughness;
+    let static_uv = prev_uv_of(subject.position);
+    let is_rare = r >= OUTLIER_ROUGHNESS && luminance(subject.radiance) > RARE * luminance(subject.around.mean);
     let share_tolerance = select(0.08 + 4.0 * r, 1.0, is_rare);
-    var cap = mix(frame.accumulate_mirror_history, frame.accumulate_max_history, smoothstep(0.0, frame.accumulate_clip_roughness, r));
-    var surface_uv = static_uv;
-    var surface = nothing_found();
+    var found = Candidates(static_uv, nothing_found(), vec2<f32>(-1.0), nothing_found());
     // Where it is not where the camera's motion alone would put it, something else moved the surface.
     var moves = false;
     if SURFACE_MOTION {
-        surface_uv = surface_prev_uv(pixel);
-        moves = length((surface_uv - static_uv) * size) > 0.5;
+        found.surface_uv = surface_prev_uv(pixel);
+        moves = length((found.surface_uv - static_uv) * vec2<f32>(frame.size)) > 0.5;
         let tolerance = Tolerance(select(0.01, 0.1, moves), select(0.9, 0.7, moves), share_tolerance);
-        surface = history_at(surface_uv, guide, position, share, tolerance);
+        found.surface = history_at(found.surface_uv, subject.guide, subject.position, subject.share, tolerance);
     }
-    var found = surface;
     if MIRROR_PARALLAX {
         let alpha = alpha_of(r);
         // The lobe's dominant direction is nearer to the normal the rougher the surface is.
         let dominant = (1.0 - alpha) * (sqrt(1.0 - alpha) + alpha);
-        let distance = hit_distance_of(share, camera_distance_of(position)) * dominant;
-        let reflection_uv = prev_uv_of(position + view_direction(position) * distance) + (surface_uv - static_uv);
+        let distance = hit_distance_of(subject.share, camera_distance_of(subject.position)) * dominant;
+        let image = subject.position + view_direction(subject.position) * distance;
+        found.reflection_uv = prev_uv_of(image) + (found.surface_uv - static_uv);
         let tolerance = Tolerance(select(0.015, 0.1, moves), select(0.98, 0.95, r >= 0.3), share_tolerance);
-        let reflection = history_at(reflection_uv, guide, position, share, tolerance);
-        let apart = max(length((reflection_uv - surface_uv) * size), 1e-3);
-        let radius = lobe_footprint(position, guide, share).along;
+        found.reflection = history_at(found.reflection_uv, subject.guide, subject.position, subject.share, tolerance);
+    }
+    return found;
+}
+
+// How much of the reflected point's history is in the mixture where there are both.
+fn reflection_weight(candidates: Candidates, subject: Subject) -> f32 {
+    let difference = misfit(candidates.reflection.radiance, subject.around) - misfit(candidates.surface.radiance, subject.around);
+    let favour = min(1.0, 2.0 / (1.0 + exp(clamp(difference, -8.0, 8.0))));
+    return favour * (1.0 - smoothstep(SURFACE_FROM, SURFACE_TO, subject.guide.roughness));
+}
+
+// History by both motions, its length bounded by what it is worth.
+fn chosen(candidates: Candidates, subject: Subject) -> Found {
+    let r = subject.guide.roughness;
+    let surface = candidates.surface;
+    var cap = mix(frame.accumulate_mirror_history, frame.accumulate_max_history, smoothstep(0.0, frame.accumulate_clip_roughness, r));
+    var found = surface;
+    if MIRROR_PARALLAX {
+        let reflection = candidates.reflection;
+        let apart = max(length((candidates.reflection_uv - candidates.surface_uv) * vec2<f32>(frame.size)), 1e-3);
+        let radius = lobe_footprint(subject.position, subject.guide, subject.share).along;
         if surface.is_valid {
             if reflection.is_valid {
-                let difference = clamp(misfit(reflection.radiance, around) - misfit(surface.radiance, around), -8.0, 8.0);
-                let favour = min(1.0, 2.0 / (1.0 + exp(difference)));
-                found = mix_found(surface, reflection, favour * (1.0 - smoothstep(SURFACE_FROM, SURFACE_TO, r)));
+                found = mix_found(surface, reflection, reflection_weight(candidates, subject));
                 cap = min(cap, 1.0 + frame.disagreement_limit * (radius + 1.0) / apart);
             } else {
                 cap = min(cap, (radius + 0.5) / apart);
@@ -264,16 +307,10 @@ fn find_history(pixel: vec2<u32>, guide: Guide, position: vec3<f32>, share: f32,
 }
 
 fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
-    let position = world_position(pixel, guide.depth);
-    let around = surroundings_of(pixel, plane_of(guide, position));
-    let radiance = sample_of(pixel, guide, around);
-    let distance = usable_hit_distance(textureLoad(in_radiance, pixel, 0).a);
-    let own_share = select(around.share, hit_share(distance, camera_distance_of(position)), distance > 0.0);
-    // Single hit distances of rough surfaces say little, and go with the colour of their sample.
-    let share = mix(own_share, around.share, smoothstep(0.03, 0.2, guide.roughness) * around.fit);
-
-    let is_rare = guide.roughness >= OUTLIER_ROUGHNESS && luminance(radiance) > RARE * luminance(around.mean);
-    var found = find_history(pixel, guide, position, share, is_rare, around);
+    let subject = subject_of(pixel, guide);
+    let radiance = subject.radiance;
+    let share = subject.share;
+    var found = chosen(candidates_of(pixel, subject), subject);
     if LIGHT_CHANGE {
         let changed = unpack2x16float(textureLoad(in_light, pixel / BLOCK_SIZE, 0).x).y;
         found.length *= 1.0 - changed * smoothstep(0.05, 0.2, guide.roughness);

@@ -367,7 +367,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         is_needed: has_debug_view,
         stage: Stage::Denoise,
         grid: GridTemplate::Tiles,
-        overrides: &["VIEW", "MIRROR_PARALLAX", "SURFACE_MOTION"],
+        overrides: &["VIEW", "MIRROR_PARALLAX", "SURFACE_MOTION", "OUTLIER_SPREAD"],
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
@@ -375,6 +375,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             ("in_prev_guide", "prev_guide", Current),
             ("in_history", "history", Previous),
             ("in_blocks", BLOCKS, Current),
+            ("in_samples", "samples", Current),
             ("in_accumulated", "history", Current),
             ("out_debug_view", DEBUG_VIEW, Current),
         ],

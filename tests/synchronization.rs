@@ -216,7 +216,7 @@ fn limpids_own_barriers() {
     // Passes wait for each other, but `fill` and the second average wait for the same barrier.
     let (plan, _) = Plan::new(&Settings::default(), UVec2::splat(64)).unwrap();
     check(&plan).unwrap();
-    assert_eq!(plan.barriers().iter().flatten().count(), 9);
+    assert_eq!(plan.barriers().iter().flatten().count(), 10);
     // `fill` only needs what came before `reproject` and runs beside `prefilter`.
     assert_eq!(passes, ["classify", "list_tiles", "indirect_args", "reproject", "prefilter", "resolve_temporal"]);
 }

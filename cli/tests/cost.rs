@@ -47,7 +47,10 @@ fn passes_cost_registers_and_instructions_on_gpus_that_are_not_here() {
 
     let output = cost(&["--gpu", "navi21"]);
     let table = String::from_utf8(output.stdout).unwrap();
-    assert!(table.contains("VGPRs") && table.contains("GB/s") && table.lines().count() == 3 + plan.passes.len(), "{table}");
+    assert!(
+        table.contains("VGPRs") && table.contains("GB/s") && table.lines().count() == 3 + plan.passes.len(),
+        "{table}"
+    );
 }
 
 #[test]

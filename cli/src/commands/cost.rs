@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use limpid::Settings;
 use limpid::kernel::Sources;
 
 use super::settings::SettingsOptions;
@@ -36,25 +37,25 @@ pub(super) struct CostCommand {
 }
 
 impl CostCommand {
-    fn costs(&self) -> Result<Vec<Cost>> {
-        let settings = self.settings.load()?;
+    fn costs(&self, settings: &Settings) -> Result<Vec<Cost>> {
         let driver = Driver::find(self.driver.as_deref())?;
         let program = std::env::current_exe()?;
-        let job = Job { program: &program, settings: &settings, kernels: self.kernels.as_deref() };
+        let job = Job { program: &program, settings, kernels: self.kernels.as_deref() };
         let named = self.gpu.iter().map(String::as_str);
         let generations = GENERATIONS.iter().map(|generation| generation.name).filter(|_| self.gpu.is_empty());
         named.chain(generations).map(|gpu| job.run(&driver, gpu)).collect()
     }
 
     pub(super) fn run(&self) -> Result<()> {
-        let traffic = traffic(&self.settings.load()?)?;
+        let settings = self.settings.load()?;
+        let traffic = traffic(&settings)?;
         if self.this_device {
             let sources = self.kernels.clone().map_or(Sources::BuiltIn, Sources::Folder);
-            let cost = on_this_device(&self.settings.load()?, &sources)?;
+            let cost = on_this_device(&settings, &sources)?;
             let text = if self.json { serde_json::to_string_pretty(&cost)? + "\n" } else { table(&[cost]) + &traffic };
             return super::print(&text);
         }
-        let costs = self.costs()?;
+        let costs = self.costs(&settings)?;
         super::print(&if self.json { serde_json::to_string_pretty(&costs)? + "\n" } else { table(&costs) + &traffic })
     }
 }
