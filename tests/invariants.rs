@@ -241,6 +241,29 @@ fn the_output_stays_between_the_darkest_and_the_brightest_input() {
     });
 }
 
+/// Other work may use the memory of what lives within a frame: nothing reads there what it has not written, not even in
+/// tiles that nothing is denoised in.
+#[test]
+fn memory_that_lives_within_a_frame_may_hold_anything_before_it() {
+    /// NaN as a float and as two half floats, and a depth at which something is denoised.
+    const WORDS: [u32; 2] = [0x7fc0_7e00, 0x4040_4040];
+    let (mut runner, _) = runner(file!(), 24);
+    let result = runner.run(&any_spec(), |spec| {
+        let case = spec.case();
+        let run = case.run(&mut Cpu::new());
+        for word in WORDS {
+            let overwritten = case.run(&mut Cpu::overwritten(word));
+            for (frame, (run, overwritten)) in run.iter().zip(&overwritten).enumerate() {
+                prop_assert_eq!(&run.0["output"], &overwritten.0["output"], "frame {}, {:x}", frame, word);
+            }
+        }
+        Ok(())
+    });
+    if let Err(error) = result {
+        panic!("{error}");
+    }
+}
+
 /// The checked mode of the CPU runs workgroups one after the other, the other mode as threads come.
 #[test]
 fn the_order_of_workgroups_does_not_matter() {

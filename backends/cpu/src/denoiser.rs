@@ -3,7 +3,7 @@ use std::collections::{BTreeMap, HashMap};
 use glam::UVec2;
 use limpid::kernel::Kernel;
 use limpid::plan::{Bound, DEBUG_VIEW, Grid, Pass, Stage};
-use limpid::resource::{Copy, Format, Kind};
+use limpid::resource::{Copy, Format, Kind, Lifetime};
 use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
 use crate::{Binding, Buffer, CompileError, Error, Executor, Fault, Probe, TexelFormat, Texture};
@@ -298,6 +298,21 @@ impl Denoiser {
 
     fn intermediate_texture_in(&self, name: &str, copy: Copy, phase: usize) -> Option<&Texture> {
         find_texture(self.core.plan(), &self.allocations, name, copy, phase)
+    }
+
+    /// Fills everything that lives within a frame with a word, as other work would that shares its memory: what comes
+    /// out must be the same.
+    pub fn overwrite_transient(&mut self, word: u32) {
+        let transient = self.core.plan().resources.iter().filter(|resource| resource.lifetime == Lifetime::Transient);
+        for resource in transient {
+            match self.allocations.get_mut(&resource.name) {
+                Some(Allocation::Textures(textures)) => {
+                    textures.iter_mut().for_each(|texture| texture.write(std::iter::repeat(word)));
+                }
+                Some(Allocation::Buffer(buffer)) => buffer.write(std::iter::repeat(word)),
+                None => {}
+            }
+        }
     }
 
     /// The denoised image of the last frame: `rgb` radiance, `a` variance. It can be another texture from frame to frame.

@@ -11,6 +11,7 @@ pub struct Cpu {
     denoiser: Option<Denoiser>,
     is_watched: bool,
     inexact: Option<u32>,
+    overwritten: Option<u32>,
 }
 
 impl Cpu {
@@ -27,6 +28,11 @@ impl Cpu {
     /// With functions as inexact as Vulkan lets devices be.
     pub fn inexact(seed: u32) -> Self {
         Self { inexact: Some(seed), ..Self::default() }
+    }
+
+    /// With a word in all memory that lives within a frame, before each frame.
+    pub fn overwritten(word: u32) -> Self {
+        Self { overwritten: Some(word), ..Self::default() }
     }
 
     /// What kernels did that they must not, as text.
@@ -93,6 +99,9 @@ impl Executor for Cpu {
             environment: Some(find("environment")),
         };
         let denoiser = self.denoiser.as_mut().unwrap();
+        if let Some(word) = self.overwritten {
+            denoiser.overwrite_transient(word);
+        }
         denoiser.denoise(&inputs, frame).unwrap();
         Snapshot::take(
             denoiser.plan(),
