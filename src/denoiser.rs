@@ -7,7 +7,7 @@ use crate::kernel::Kernel;
 use crate::plan::{Grid, Plan};
 use crate::resource::{Extent, TILE_SIZE};
 use crate::settings::Settings;
-use crate::{Error, plan};
+use crate::{Error, passes};
 
 /// What a backend has to know to run one frame of a [`Plan`].
 #[derive(Debug, Clone, PartialEq)]
@@ -115,8 +115,8 @@ impl Denoiser {
         (self.previous, self.started) = (None, None);
     }
 
-    /// Goes on to the next frame, for the passes of [`Stage::Classify`](plan::Stage::Classify). Those of
-    /// [`Stage::Denoise`](plan::Stage::Denoise) follow with [`started_frame`](Self::started_frame) and
+    /// Goes on to the next frame, for the passes of [`Stage::Classify`](crate::plan::Stage::Classify). Those of
+    /// [`Stage::Denoise`](crate::plan::Stage::Denoise) follow with [`started_frame`](Self::started_frame) and
     /// [`finish_frame`](Self::finish_frame). A frame that was started and never finished left no history.
     ///
     /// # Errors
@@ -155,6 +155,6 @@ impl Denoiser {
     /// Where in the buffer `args` the grid of the ray list is, in bytes: workgroups of 64 rays in x, y and z,
     /// then the number of rays. `None` without a ray list.
     pub fn ray_args_offset(&self) -> Option<u64> {
-        self.plan.resource("rays").map(|_| plan::RAY_ARGS * plan::ARGS_STRIDE)
+        self.plan.resource("rays").map(|_| passes::RAY_ARGS * passes::ARGS_STRIDE)
     }
 }

@@ -68,6 +68,7 @@ pub mod export;
 mod frame;
 pub mod kernel;
 pub mod memory;
+mod passes;
 pub mod plan;
 pub mod resource;
 pub mod settings;
