@@ -147,7 +147,8 @@ fn history_at(prev_uv: vec2<f32>, guide: Guide, position: vec3<f32>, share: f32,
         return nothing_found();
     }
     let base = floor(place - 0.5);
-    let fraction = place - 0.5 - base;
+    // In steps: of a still image the rest is rounding, which would leak light from lamps.
+    let fraction = round((place - 0.5 - base) * 256.0) * (1.0 / 256.0);
     let last = vec2<i32>(frame.prev_size) - 1;
     var radiance = vec3<f32>(0.0);
     var length_and_share = vec2<f32>(0.0);

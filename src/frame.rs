@@ -35,14 +35,16 @@ pub struct FrameInputs {
     /// output are not exposed; it may change every frame. Output is half float: where exposed radiance near 1
     /// stands for more than 65504 or less than 0.0001, scale the input instead.
     pub exposure: f32,
+    /// Time since the frame before, in seconds. Above 0. Settings in seconds are counted in frames of this length.
+    pub frame_seconds: f32,
     /// Camera of the preceding frame, where it is not the one that was denoised last (frames were skipped).
     pub previous_camera: Option<Camera>,
 }
 
 impl FrameInputs {
-    /// A frame that continues the last one, exposure 1.
+    /// A frame that continues the last one, at exposure 1 and 60 frames per second.
     pub fn new(camera: Camera, size: UVec2) -> Self {
-        Self { camera, size, reset: false, exposure: 1.0, previous_camera: None }
+        Self { camera, size, reset: false, exposure: 1.0, frame_seconds: 1.0 / 60.0, previous_camera: None }
     }
 }
 
@@ -134,6 +136,9 @@ constants! {
     }
 }
 
+/// Frames that `kernels/shared/history.wgsl` can count.
+const LONGEST_HISTORY: f32 = 31.0;
+
 /// What the denoiser remembers of the frame before.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Previous {
@@ -205,9 +210,10 @@ fn check_frame(inputs: &FrameInputs, allocated: UVec2) -> Result<(), Error> {
     if inputs.size.min_element() == 0 || inputs.size.cmpgt(allocated).any() {
         return Err(Error::Size { what: "frame input `size`", size: inputs.size, limit: allocated });
     }
-    if !(inputs.exposure.is_normal() && inputs.exposure > 0.0) {
-        let expected = "a finite number above 0";
-        return Err(Error::FrameInput { field: "exposure", value: inputs.exposure, expected });
+    for (field, value) in [("exposure", inputs.exposure), ("frame_seconds", inputs.frame_seconds)] {
+        if !(value.is_normal() && value > 0.0) {
+            return Err(Error::FrameInput { field, value, expected: "a finite number above 0" });
+        }
     }
     check_camera(&inputs.camera)?;
     inputs.previous_camera.as_ref().map_or(Ok(()), check_camera)
@@ -280,6 +286,7 @@ pub(crate) fn constants(
     let (reproject, prefilter, resolve) = (&settings.reproject, &settings.prefilter, &settings.resolve);
     let (accumulate, footprint) = (&settings.accumulate, &settings.footprint);
     let ray_list = settings.coverage.ray_list.as_ref();
+    let frames = |seconds: f32| (seconds / inputs.frame_seconds).clamp(1.0, LONGEST_HISTORY);
     let neighborhood = |i: f32| (-reproject.neighborhood_falloff * i * i / 25.0).exp();
     Ok(FrameConstants {
         world_from_pixel: columns(view_to_relative * view_from_pixel),
@@ -330,8 +337,8 @@ pub(crate) fn constants(
         clip_scale: resolve.clip_scale,
         clip_average_pull: resolve.clip_average_pull,
         clip_extent_floor: resolve.clip_extent_floor,
-        accumulate_max_history: accumulate.max_history,
-        accumulate_mirror_history: accumulate.mirror_history,
+        accumulate_max_history: frames(accumulate.max_history_seconds),
+        accumulate_mirror_history: frames(accumulate.mirror_history_seconds),
         accumulate_clip_roughness: accumulate.clip_roughness,
         accumulate_clip_scale: accumulate.clip_scale,
         outlier_factor: accumulate.outlier_factor,
@@ -339,7 +346,7 @@ pub(crate) fn constants(
         disagreement_limit: accumulate.disagreement_limit,
         light_change_sigma: accumulate.light_change_sigma,
         light_change_share: accumulate.light_change_share,
-        light_change_rate: accumulate.light_change_rate,
+        light_change_rate: 1.0 - (-inputs.frame_seconds / accumulate.light_change_seconds).exp(),
         filter_scale: footprint.filter_scale,
         excess_scale: footprint.excess_scale,
         grazing_width: footprint.grazing_width,

@@ -41,6 +41,7 @@
 //! | motion | `uv_now - uv_before` of the surface after multiplication by `motion_scale`, object motion included: `previous = uv - motion * scale` |
 //! | jitter | where in the pixel the camera sampled, in pixels from the centre; history is kept at pixel centres |
 //! | exposure | [`FrameInputs::exposure`] brings radiance near 1, where the published constants were tuned; images go in and out unexposed |
+//! | time | [`FrameInputs::frame_seconds`] is the time since the last frame: settings in seconds hold at any frame rate |
 //! | output | `rgb`: denoised radiance, not exposed; `a`: temporal variance, 0 to 1. Pixels that are left out hold the [`Fallback`](settings::Fallback) |
 //!
 //! ## Are my motion vectors right?

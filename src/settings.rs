@@ -451,12 +451,12 @@ numeric_settings! {
 numeric_settings! {
     /// Constants of accumulation over time, for [`Pipeline::Footprint`]. Colours are exposed radiance.
     Accumulate in "accumulate" {
-        /// Longest history on rough surfaces, in frames.
-        max_history = 31.0, 1.0 to 31.0;
-        /// Longest history on mirrors, in frames.
-        mirror_history = 8.0, 1.0 to 31.0;
+        /// Longest history on rough surfaces, in seconds. Between 1 and 31 frames.
+        max_history_seconds = 0.5, 0.0 to 10.0;
+        /// Longest history on mirrors, in seconds. Between 1 and 31 frames.
+        mirror_history_seconds = 0.13, 0.0 to 10.0;
         /// Perceptual roughness below which history is clipped to the 3x3 pixels, and from which on it may be as long
-        /// as `max_history`.
+        /// as `max_history_seconds`.
         clip_roughness = 0.15, 0.001 to 1.0;
         /// Half size of what it is clipped to, in deviations of the 3x3 pixels.
         clip_scale = 1.3, 0.0 to 1000.0;
@@ -471,8 +471,8 @@ numeric_settings! {
         light_change_sigma = 3.25, 0.1 to 1000.0;
         /// Share of the brightness that it has to change by besides.
         light_change_share = 0.15, 0.0 to 1000.0;
-        /// Share of each frame in the brightness that it is compared with next.
-        light_change_rate = 0.15, 0.001 to 1.0;
+        /// Time constant of the brightness that it is compared with, in seconds.
+        light_change_seconds = 0.1, 0.0 to 10.0;
     }
 }
 

@@ -158,6 +158,7 @@ const CALM: FrameSpec = FrameSpec {
     camera_turn: 0.0,
     jitter: (0.0, 0.0),
     exposure: 1.0,
+    seconds: 1.0 / 60.0,
     reset: false,
     resize: None,
 };

@@ -60,10 +60,10 @@ fn any_camera(projection: Mat4) -> impl Strategy<Value = Camera> {
 fn any_case(projection: Mat4) -> impl Strategy<Value = Case> {
     let size = || (1u32..=SIZE.x, 1u32..=SIZE.y).prop_map(|(x, y)| UVec2::new(x, y));
     let previous = prop::option::of((any_camera(projection), size()));
-    (any_camera(projection), size(), 0.001f32..1000.0, any::<bool>(), previous).prop_map(
-        |(camera, size, exposure, reset, previous)| {
+    (any_camera(projection), size(), 0.001f32..1000.0, 0.001f32..0.2, any::<bool>(), previous).prop_map(
+        |(camera, size, exposure, seconds, reset, previous)| {
             let mut inputs = FrameInputs::new(camera, size);
-            (inputs.exposure, inputs.reset) = (exposure, reset);
+            (inputs.exposure, inputs.frame_seconds, inputs.reset) = (exposure, seconds, reset);
             Case { inputs, previous }
         },
     )
@@ -78,7 +78,8 @@ fn record(case: &Case) -> Vec<u32> {
     let mut words = Vec::new();
     push_camera(&mut words, &case.inputs.camera);
     words.extend(case.inputs.size.to_array());
-    words.extend([case.inputs.exposure.to_bits(), u32::from(case.inputs.reset)]);
+    words.extend([case.inputs.exposure, case.inputs.frame_seconds].map(f32::to_bits));
+    words.push(u32::from(case.inputs.reset));
     let (camera, size) = case.previous.unwrap_or((case.inputs.camera, UVec2::ONE));
     push_camera(&mut words, &camera);
     words.extend(size.to_array());

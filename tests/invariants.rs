@@ -108,6 +108,57 @@ fn world_units_do_not_matter() {
     });
 }
 
+/// Radiance that jumps, seen at two frame rates, is as far on its way after the same time.
+#[test]
+fn frame_rates_do_not_matter() {
+    let any = (0.05f32..1.0, 0.0f32..4.0, 10u32..=60, 10u32..=60, 0.1f32..0.6);
+    for_all(16, any, |executor, (roughness, after, slow, fast, time)| {
+        let mut reached = |rate: u32| {
+            // History is as long as it gets after half a second.
+            let before = rate;
+            let count = before + (time * rate as f32).round() as u32;
+            let mut case = Case::still(UVec2::splat(8), count, |frame, _| {
+                let value = if frame < before { 1.0 } else { after };
+                Pixel { radiance: [value, value, value, 3.0], roughness, ..Pixel::WALL }
+            });
+            case.settings.features.light_change = false;
+            case.settings.features.history_clip = false;
+            case.steps.iter_mut().for_each(|step| step.frame.frame_seconds = 1.0 / rate as f32);
+            last_output(&case.run(executor))[27][0]
+        };
+        let (slow, fast) = (reached(slow), reached(fast));
+        prop_assert!((slow - fast).abs() <= 0.08 * (after - 1.0).abs() + 0.01, "{} and {}", slow, fast);
+        Ok(())
+    });
+}
+
+/// Filters are as wide in radians at any resolution: a blurred edge looks the same at twice the resolution. Were they as
+/// wide in pixels, the mean difference would be 0.02 to 0.05.
+#[test]
+fn resolution_does_not_matter() {
+    let sizes = (32u32..80, 16u32..40).prop_map(UVec2::from);
+    for_all(16, (sizes, 0.7f32..1.0, 0.5f32..4.0, 0.3f32..0.7), |executor, (size, roughness, distance, edge)| {
+        let edge = (edge * size.x as f32) as u32;
+        let mut run = |scale: u32| {
+            let case = Case::still(scale * size, 6, |_, p| {
+                let value = if p.x < scale * edge { 0.1 } else { 1.0 };
+                Pixel { radiance: [value, value, value, distance], roughness, ..Pixel::WALL }
+            });
+            last_output(&case.run(executor))
+        };
+        let (coarse, fine) = (run(1), run(2));
+        let mut difference = 0.0;
+        for (index, texel) in coarse.iter().enumerate() {
+            let (x, y) = (2 * (index as u32 % size.x), 2 * (index as u32 / size.x));
+            let at = |dx: u32, dy: u32| fine[((y + dy) * 2 * size.x + x + dx) as usize][0];
+            let mean = (at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1)) / 4.0;
+            difference += (mean - texel[0]).abs() / coarse.len() as f32;
+        }
+        prop_assert!(difference <= 0.015, "{}", difference);
+        Ok(())
+    });
+}
+
 #[test]
 fn a_mirrored_scene_gives_a_mirrored_image() {
     let sizes = (1u32..5, 1u32..40).prop_map(|(tiles, height)| UVec2::new(8 * tiles, height));

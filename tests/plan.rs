@@ -197,6 +197,7 @@ fn bad_input_is_refused_by_name_and_changes_nothing() {
     refuse(&|i| i.size = UVec2::ZERO, "expected 1 to [64, 64]");
     refuse(&|i| i.exposure = 0.0, "`exposure` is 0");
     refuse(&|i| i.exposure = f32::NAN, "`exposure` is NaN");
+    refuse(&|i| i.frame_seconds = 0.0, "`frame_seconds` is 0");
     refuse(&|i| i.camera.jitter.x = f32::INFINITY, "jitter.x");
     refuse(&|i| i.camera.world_to_view = Mat4::ZERO, "world_to_view` is not a rigid motion");
     refuse(&|i| i.camera.world_to_view.x_axis.x = f32::NAN, "world_to_view` has entries");

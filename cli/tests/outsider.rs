@@ -102,6 +102,7 @@ fn write_sequence(case: &Case, folder: &Path) {
             "view_to_clip": camera.view_to_clip.to_cols_array(),
             "jitter": camera.jitter.to_array(),
             "exposure": frame.exposure,
+            "frame_seconds": frame.frame_seconds,
             "reset": frame.reset,
         }));
     }

@@ -64,6 +64,7 @@ struct Frame {
     clip_scale: f32,
     clip_average_pull: f32,
     clip_extent_floor: f32,
+    // Longest histories, in frames.
     accumulate_max_history: f32,
     accumulate_mirror_history: f32,
     accumulate_clip_roughness: f32,
@@ -73,6 +74,7 @@ struct Frame {
     disagreement_limit: f32,
     light_change_sigma: f32,
     light_change_share: f32,
+    // Share of each frame in the brightness that it is compared with next.
     light_change_rate: f32,
     filter_scale: f32,
     excess_scale: f32,

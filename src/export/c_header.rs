@@ -10,10 +10,14 @@ use crate::resource::{Access, BLOCK_SIZE, Copy, Count, Extent, Kind, Lifetime, T
 use crate::settings::{DepthEncoding, NdcY};
 use crate::{Camera, Error, FrameInputs};
 
+/// Constants that are made of settings and more.
+const DERIVED: [&str; 4] =
+    ["accumulate_max_history", "accumulate_mirror_history", "light_change_rate", "history_length_steps"];
+
 /// The fields of the constant buffer that settings go to unchanged.
 fn setting_fields() -> impl Iterator<Item = &'static (&'static str, usize, usize)> {
     let from = FrameConstants::FIELDS.iter().skip_while(|(name, ..)| *name != "roughness_threshold");
-    from.filter(|(name, ..)| *name != "history_length_steps")
+    from.filter(|(name, ..)| !DERIVED.contains(name))
 }
 
 /// A float as C writes it.
@@ -82,6 +86,18 @@ impl Export<'_> {
         frame::constants(self.settings, &FrameInputs::new(camera, size), size, None)
     }
 
+    /// Settings that constants are made of together with something else.
+    fn source_settings(&self) -> impl Iterator<Item = (&'static str, f32)> {
+        let (reproject, accumulate) = (&self.settings.reproject, &self.settings.accumulate);
+        [
+            ("neighborhood_falloff", reproject.neighborhood_falloff),
+            ("max_history_seconds", accumulate.max_history_seconds),
+            ("mirror_history_seconds", accumulate.mirror_history_seconds),
+            ("light_change_seconds", accumulate.light_change_seconds),
+        ]
+        .into_iter()
+    }
+
     fn settings_struct(&self) -> Result<String, Error> {
         let constants = self.some_constants()?;
         let bytes = bytemuck::bytes_of(&constants);
@@ -91,8 +107,9 @@ impl Export<'_> {
             /* Settings that may change every frame: meanings and ranges are in the documentation of limpid::Settings. */\n\
             typedef struct LimpidSettings {\n    int depth; /* LIMPID_DEPTH_ */\n    int ndc_y; /* LIMPID_NDC_Y_ */\n    \
             int motion_includes_jitter;\n    float sky_distance;\n    float motion_scale[2];\n    \
-            float environment_from_world[9]; /* column by column */\n    float neighborhood_falloff;\n"
+            float environment_from_world[9]; /* column by column */\n"
             .to_owned();
+        text.extend(self.source_settings().map(|(name, _)| c_field(name, size_of::<f32>())));
         text.extend(setting_fields().map(|&(name, _, size)| c_field(name, size)));
         text += "} LimpidSettings;\n\n/* The settings that were exported. */\n\
                  static inline LimpidSettings limpid_settings(void) {\n    LimpidSettings settings;\n";
@@ -112,8 +129,7 @@ impl Export<'_> {
         let environment = self.settings.coverage.environment_from_world.to_cols_array();
         text += &format!("    const float environment[9] = {{{}}};\n", floats(&environment));
         text += "    memcpy(settings.environment_from_world, environment, sizeof environment);\n";
-        let falloff = self.settings.reproject.neighborhood_falloff;
-        text += &format!("    settings.neighborhood_falloff = {};\n", float(falloff));
+        text.extend(self.source_settings().map(|(name, value)| format!("    settings.{name} = {};\n", float(value))));
         for &(name, offset, size) in setting_fields() {
             let value: f32 = bytemuck::pod_read_unaligned(&bytes[offset..offset + size]);
             text += &format!("    settings.{name} = {};\n", float(value));

@@ -10,9 +10,10 @@ typedef struct LimpidCamera {
 /* What changes from frame to frame. */
 typedef struct LimpidInputs {
     LimpidCamera camera;
-    uint32_t size[2]; /* pixels of this frame, at most those allocated */
-    float exposure;   /* factor that brings radiance near 1, above 0 */
-    int reset;        /* not 0: history is of no use (camera cut) */
+    uint32_t size[2];    /* pixels of this frame, at most those allocated */
+    float exposure;      /* factor that brings radiance near 1, above 0 */
+    float frame_seconds; /* time since the frame before, above 0 */
+    int reset;           /* not 0: history is of no use (camera cut) */
 } LimpidInputs;
 
 /* The frame that was denoised last. */
@@ -210,6 +211,11 @@ static inline void limpid_fill_reprojection(const LimpidSettings *settings, cons
     limpid_store(world_from_pixel, frame->world_from_prev_pixel);
 }
 
+/* Frames of a history that is so many seconds long. */
+static inline float limpid_frames(float seconds, const LimpidInputs *inputs) {
+    return fminf(fmaxf(seconds / inputs->frame_seconds, 1.0f), 31.0f);
+}
+
 /*
  * Fills the constant buffer. `previous` is the frame that was denoised last, NULL if there is none.
  * Returns NULL, or what is wrong with the inputs; `frame` is not to be used then.
@@ -228,6 +234,9 @@ static inline const char *limpid_fill_constants(
     }
     if (!(isnormal(inputs->exposure) && inputs->exposure > 0.0f)) {
         return "exposure is not a finite number above 0";
+    }
+    if (!(isnormal(inputs->frame_seconds) && inputs->frame_seconds > 0.0f)) {
+        return "frame_seconds is not a finite number above 0";
     }
     const LimpidCamera *prev_camera = previous != NULL ? &previous->camera : &inputs->camera;
     const uint32_t *prev_size = previous != NULL ? previous->size : inputs->size;
@@ -258,6 +267,9 @@ static inline const char *limpid_fill_constants(
     frame->exposure = inputs->exposure;
     frame->inverse_exposure = 1.0f / inputs->exposure;
     limpid_copy_settings(settings, frame);
+    frame->accumulate_max_history = limpid_frames(settings->max_history_seconds, inputs);
+    frame->accumulate_mirror_history = limpid_frames(settings->mirror_history_seconds, inputs);
+    frame->light_change_rate = 1.0f - expf(-inputs->frame_seconds / settings->light_change_seconds);
     frame->history_length_steps = floorf(255.0f / settings->max_history);
     return NULL;
 }

@@ -73,6 +73,7 @@ impl Backend for Cpu {
         let size = frame.size;
         let mut frame_inputs = FrameInputs::new(frame.camera, size);
         frame_inputs.reset = frame.reset;
+        frame_inputs.frame_seconds = frame.seconds;
         frame_inputs.exposure = exposure;
         let normal = texture(TexelFormat::Rgba32Float, size, frame.normal.iter().flat_map(|&[x, y, z]| [x, y, z, 0.0]));
         let roughness = texture(TexelFormat::R32Float, size, frame.roughness.iter().copied());

@@ -245,6 +245,7 @@ impl Backend for Gpu {
     fn denoise(&mut self, frame: &Frame, exposure: f32, tracer: Option<Tracer<'_>>) -> Result<Denoised> {
         let mut inputs = FrameInputs::new(frame.camera, frame.size);
         inputs.reset = frame.reset;
+        inputs.frame_seconds = frame.seconds;
         inputs.exposure = exposure;
         self.upload_gbuffer(frame);
         if tracer.is_none() {

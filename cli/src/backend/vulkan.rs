@@ -75,6 +75,7 @@ impl Backend for Vulkan {
         let size = frame.size;
         let mut frame_inputs = FrameInputs::new(frame.camera, size);
         frame_inputs.reset = frame.reset;
+        frame_inputs.frame_seconds = frame.seconds;
         frame_inputs.exposure = exposure;
         let (session, context) = (&mut self.session, &self.context);
         let normals: Vec<[f32; 4]> = frame.normal.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect();

@@ -43,8 +43,16 @@ pub const ACCUMULATION: &str = "accumulation";
 
 /// Name, what is left out of the default preset, and the settings that leave it out without being a feature.
 pub const ABLATIONS: &[(&str, &str, &[&str])] = &[
-    ("short-history", "history counts as one frame", &["accumulate.mirror_history=1", "accumulate.max_history=1"]),
-    ("long-mirror-history", "history of mirrors as long as of other surfaces", &["accumulate.mirror_history=31"]),
+    (
+        "short-history",
+        "history counts as one frame",
+        &["accumulate.mirror_history_seconds=0", "accumulate.max_history_seconds=0"],
+    ),
+    (
+        "long-mirror-history",
+        "history of mirrors as long as of other surfaces",
+        &["accumulate.mirror_history_seconds=0.5"],
+    ),
     ("no-outlier-cut", "outliers stay where they are", &["accumulate.outlier_factor=65504"]),
     ("no-excess", "what is cut off from outliers is lost", &["accumulate.excess_limit=0"]),
     ("no-disagreement-limit", "two histories apart count in full", &["accumulate.disagreement_limit=1000"]),

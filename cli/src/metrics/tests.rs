@@ -51,6 +51,7 @@ fn frame(t: u32) -> Frame {
         number: t,
         size: SIZE,
         reset: t == 0 || t == 3,
+        seconds: 1.0 / 60.0,
         camera: Camera { world_to_view: Mat4::IDENTITY, view_to_clip: Mat4::IDENTITY, jitter: Vec2::ZERO },
         radiance: vec![[0.0; 4]; pixels],
         normal: vec![[0.0; 3]; pixels],

@@ -55,6 +55,7 @@ pub(super) fn gbuffer(world: &World, previous: Option<&World>, number: u32, size
         number,
         size,
         reset: previous.is_none(),
+        seconds: 1.0 / world.scene.frames_per_second,
         camera,
         radiance: vec![[0.0; 4]; pixels.len()],
         normal: pixels.iter().map(|p| p.normal).collect(),

@@ -24,12 +24,13 @@ pub(super) struct FrameEntry {
     pub(super) number: u32,
     pub(super) file: String,
     pub(super) reset: bool,
+    pub(super) seconds: f32,
     pub(super) camera: Camera,
 }
 
 impl CameraFile {
-    /// Reads and checks the file. `sequence`, `exposure` (1), and a frame's `reset` (false) and
-    /// `jitter` (0, 0) may be left out; keys unknown here are ignored.
+    /// Reads and checks the file. `sequence`, `exposure` (1), and a frame's `reset` (false), `seconds` (1/60)
+    /// and `jitter` (0, 0) may be left out; keys unknown here are ignored.
     pub(super) fn read(path: &Path) -> Result<Self, SequenceError> {
         let text = fs::read_to_string(path).map_err(|reason| SequenceError::read(path, reason))?;
         let root: Value =
@@ -39,7 +40,7 @@ impl CameraFile {
         Ok(Self {
             name: root.key("sequence").optional(|f| f.text())?,
             size: UVec2::new(root.key("width").side()?, root.key("height").side()?),
-            exposure: root.key("exposure").optional(|f| f.exposure())?.unwrap_or(1.0),
+            exposure: root.key("exposure").optional(|f| f.positive())?.unwrap_or(1.0),
             frames: frames.iter().map(FrameEntry::from_field).collect::<Result<_, _>>()?,
         })
     }
@@ -51,6 +52,7 @@ impl FrameEntry {
             number: frame.key("frame").number()?,
             file: frame.key("file").text()?,
             reset: frame.key("reset").optional(|f| f.flag())?.unwrap_or(false),
+            seconds: frame.key("seconds").optional(|f| f.positive())?.unwrap_or(1.0 / 60.0),
             camera: Camera {
                 world_to_view: frame.key("view").matrix()?,
                 view_to_clip: frame.key("proj").matrix()?,
@@ -135,9 +137,9 @@ impl<'a> Field<'a> {
         real.ok_or_else(|| self.expected("a finite number"))
     }
 
-    fn exposure(&self) -> Result<f32, SequenceError> {
-        let exposure = self.real().ok().map(|x| x as f32).filter(|x| *x > 0.0);
-        exposure.ok_or_else(|| self.expected("a number above 0"))
+    fn positive(&self) -> Result<f32, SequenceError> {
+        let number = self.real().ok().map(|x| x as f32).filter(|x| *x > 0.0);
+        number.ok_or_else(|| self.expected("a number above 0"))
     }
 
     fn vector(&self) -> Result<Vec2, SequenceError> {

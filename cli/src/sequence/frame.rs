@@ -16,6 +16,8 @@ pub struct Frame {
     pub size: UVec2,
     /// Whether history is invalid at this frame: the first one, or a camera cut.
     pub reset: bool,
+    /// Time since the frame before, in seconds.
+    pub seconds: f32,
     /// The camera the frame was rendered with.
     pub camera: Camera,
     /// Linear radiance along one reflection ray (rgb) and that ray's world-space length to its hit

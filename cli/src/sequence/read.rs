@@ -97,6 +97,7 @@ impl Sequence {
             number: entry.number,
             size,
             reset: entry.reset,
+            seconds: entry.seconds,
             camera: entry.camera,
             radiance: interleave([r, g, b, a]),
             normal: interleave([x, y, z]),

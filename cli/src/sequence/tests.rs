@@ -51,6 +51,7 @@ fn frame(number: u32) -> Frame {
         number,
         size: SIZE,
         reset: number.is_multiple_of(4),
+        seconds: 0.125 * (1 + number) as f32,
         camera: Camera {
             world_to_view: Mat4::from_rotation_y(0.7) * Mat4::from_translation(-eye),
             view_to_clip: PROJECTION,

@@ -208,6 +208,7 @@ impl Case {
             number: number as u32,
             size,
             reset,
+            seconds: 1.0 / 60.0,
             camera,
             radiance: pixels.iter().map(|p| p.radiance).collect(),
             normal: pixels.iter().map(|p| p.normal).collect(),

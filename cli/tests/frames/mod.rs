@@ -17,6 +17,7 @@ fn step(frame: &Frame) -> Step {
     };
     let mut inputs = FrameInputs::new(frame.camera, frame.size);
     inputs.reset = frame.reset;
+    inputs.frame_seconds = frame.seconds;
     let images = Images { size: frame.size, pixels: (0..frame.pixels()).map(pixel).collect() };
     Step { change: Change::None, frame: inputs, images }
 }

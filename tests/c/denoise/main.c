@@ -91,6 +91,7 @@ static LimpidInputs read_inputs(const Json *frame) {
     json_floats(frame, "view_to_clip", inputs.camera.view_to_clip, 16);
     json_floats(frame, "jitter", inputs.camera.jitter, 2);
     inputs.exposure = (float)json_number(frame, "exposure");
+    inputs.frame_seconds = (float)json_number(frame, "frame_seconds");
     inputs.size[0] = json_uint(frame, "width");
     inputs.size[1] = json_uint(frame, "height");
     inputs.reset = json_true(frame, "reset");

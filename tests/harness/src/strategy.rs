@@ -190,6 +190,8 @@ pub struct FrameSpec {
     pub jitter: (f32, f32),
     /// Exposure.
     pub exposure: f32,
+    /// Time since the frame before.
+    pub seconds: f32,
     /// Camera cut.
     pub reset: bool,
     /// New largest size as a share of the first, before this frame.
@@ -227,12 +229,13 @@ fn any_frame() -> impl Strategy<Value = FrameSpec> {
         prop_oneof![2 => Just(0.0f32), 1 => -0.1f32..0.1],
         prop_oneof![2 => Just((0.0f32, 0.0f32)), 1 => (-0.5f32..0.5, -0.5f32..0.5)],
         prop_oneof![4 => Just(1.0f32), 1 => select(&[0.001f32, 0.1, 10.0, 1e4][..])],
+        prop_oneof![4 => Just(1.0f32 / 60.0), 1 => select(&[1e-6f32, 0.004, 0.1, 1e6][..])],
         prop::bool::weighted(0.1),
     );
     let resize = prop::option::weighted(0.08, (0.2f32..1.5, 0.2f32..1.5));
     ((share(), share()), 0u32..1000, images, camera, resize).prop_map(|(scale, seed, images, camera, resize)| {
         let (radiance, hit_distance, depth, roughness, normals, normal_length, motion) = images;
-        let (camera_shift, camera_turn, jitter, exposure, reset) = camera;
+        let (camera_shift, camera_turn, jitter, exposure, seconds, reset) = camera;
         FrameSpec {
             scale,
             seed,
@@ -247,6 +250,7 @@ fn any_frame() -> impl Strategy<Value = FrameSpec> {
             camera_turn,
             jitter,
             exposure,
+            seconds,
             reset,
             resize,
         }
@@ -434,6 +438,7 @@ impl FrameSpec {
         camera.jitter = Vec2::from(self.jitter);
         let mut frame = FrameInputs::new(camera, size);
         frame.exposure = self.exposure;
+        frame.frame_seconds = self.seconds;
         frame.reset = self.reset;
         Step { change, frame, images: Images::new(size, |p| self.pixel(p, size)) }
     }
