@@ -1,5 +1,7 @@
 //! The scheduler: keeps what one frame leaves to the next, and says what each frame dispatches.
 
+use std::sync::Arc;
+
 use glam::UVec2;
 
 use crate::frame::{self, FrameConstants, FrameInputs, Previous};
@@ -7,6 +9,7 @@ use crate::kernel::Kernel;
 use crate::plan::{Grid, Plan};
 use crate::resource::{Extent, TILE_SIZE};
 use crate::settings::Settings;
+use crate::variants::Variants;
 use crate::{Error, passes};
 
 /// What a backend has to know to run one frame of a [`Plan`].
@@ -37,12 +40,24 @@ impl FrameSchedule {
     }
 }
 
+/// What new settings change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Change {
+    /// Constants. Pipelines, resources and history stay.
+    Constants,
+    /// Kernels too. What is bound to them, resources and history stay.
+    Kernels,
+    /// All: resources have to be made anew, and history is lost.
+    Plan,
+}
+
 /// Decides passes, resources and constants. Backends own one and carry out what it says.
 #[derive(Debug, Clone)]
 pub struct Denoiser {
     settings: Settings,
     plan: Plan,
-    kernels: Vec<Kernel>,
+    kernels: Vec<Arc<Kernel>>,
+    variants: Variants,
     frame_index: u32,
     previous: Option<Previous>,
     started: Option<FrameSchedule>,
@@ -55,14 +70,17 @@ impl Denoiser {
     ///
     /// As [`Plan::new`].
     pub fn new(settings: &Settings, size: UVec2) -> Result<Self, Error> {
-        let (plan, kernels) = Plan::new(settings, size)?;
-        Ok(Self::with_plan(settings, plan, kernels))
+        let mut variants = Variants::default();
+        let (plan, kernels) = Plan::from_variants(settings, size, &mut variants)?;
+        let settings = settings.clone();
+        Ok(Self { settings, plan, kernels, variants, frame_index: 0, previous: None, started: None })
     }
 
     /// A denoiser that runs a plan other than the settings' own: for tests of backends, which have to carry out
     /// any plan. `kernels` are those of its passes, in order.
     pub fn with_plan(settings: &Settings, plan: Plan, kernels: Vec<Kernel>) -> Self {
-        Self { settings: settings.clone(), plan, kernels, frame_index: 0, previous: None, started: None }
+        let (settings, kernels) = (settings.clone(), kernels.into_iter().map(Arc::new).collect());
+        Self { settings, plan, kernels, variants: Variants::default(), frame_index: 0, previous: None, started: None }
     }
 
     /// What is allocated and dispatched.
@@ -71,7 +89,7 @@ impl Denoiser {
     }
 
     /// The kernel of each pass of the plan, in order.
-    pub fn kernels(&self) -> &[Kernel] {
+    pub fn kernels(&self) -> &[Arc<Kernel>] {
         &self.kernels
     }
 
@@ -80,22 +98,45 @@ impl Denoiser {
         &self.settings
     }
 
-    /// Changes settings. Returns whether the plan changed, so that the backend has to make its pipelines and
-    /// resources anew; history is lost then. Otherwise only constants changed, and history is kept.
+    /// Changes settings. What was made for settings that were in force or [prepared](Self::prepare) before is used
+    /// again.
     ///
     /// # Errors
     ///
     /// As [`Plan::new`]; nothing changes then.
-    pub fn set_settings(&mut self, settings: &Settings) -> Result<bool, Error> {
-        let (plan, kernels) = Plan::new(settings, self.plan.size)?;
+    pub fn set_settings(&mut self, settings: &Settings) -> Result<Change, Error> {
+        let (plan, kernels) = Plan::from_variants(settings, self.plan.size, &mut self.variants)?;
         // The length of stored history is counted in steps that depend on its limit.
-        let rebuilt = plan != self.plan || settings.reproject.max_history != self.settings.reproject.max_history;
+        let counts_alike = settings.reproject.max_history == self.settings.reproject.max_history;
+        let change = match plan == self.plan {
+            true if counts_alike => Change::Constants,
+            false if counts_alike && plan.is_like(&self.plan) => Change::Kernels,
+            _ => Change::Plan,
+        };
         self.settings = settings.clone();
-        if rebuilt {
+        if change != Change::Constants {
             (self.plan, self.kernels) = (plan, kernels);
+        }
+        if change == Change::Plan {
             self.forget();
         }
-        Ok(rebuilt)
+        Ok(change)
+    }
+
+    /// Makes the kernels of settings that may be set later, and returns them with their plan, for backends to make
+    /// pipelines of.
+    ///
+    /// # Errors
+    ///
+    /// As [`Plan::new`].
+    pub fn prepare(&mut self, settings: &Settings) -> Result<(Plan, Vec<Arc<Kernel>>), Error> {
+        Plan::from_variants(settings, self.plan.size, &mut self.variants)
+    }
+
+    /// All kernels that are kept, at most [`MAX_VARIANTS`](crate::variants::MAX_VARIANTS) and those in force. A kernel
+    /// of the same pass with the same override constants is the same one as long as it is kept.
+    pub fn variants(&self) -> impl Iterator<Item = &Arc<Kernel>> + Clone {
+        self.variants.kernels().chain(&self.kernels)
     }
 
     /// Changes the largest image size. Pipelines stay; resources have to be allocated anew, and history is

@@ -277,6 +277,12 @@ impl Kernel {
     }
 }
 
+impl AsRef<Self> for Kernel {
+    fn as_ref(&self) -> &Self {
+        self
+    }
+}
+
 /// An error and its causes in one line.
 struct DisplayChain<'a>(&'a dyn std::error::Error);
 

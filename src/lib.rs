@@ -74,9 +74,10 @@ pub mod plan;
 pub mod resource;
 pub mod settings;
 pub mod synchronization;
+pub mod variants;
 
 pub use debug_view::{DebugView, Key, Legend};
-pub use denoiser::{Denoiser, FrameSchedule};
+pub use denoiser::{Change, Denoiser, FrameSchedule};
 pub use error::Error;
 pub use frame::{Camera, FrameConstants, FrameInputs};
 pub use plan::Plan;

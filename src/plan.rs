@@ -1,6 +1,7 @@
 //! The plan: every resource and pass of a denoiser as plain data, for backends to carry out.
 
 use std::fmt;
+use std::sync::Arc;
 
 use glam::UVec2;
 use serde::{Deserialize, Serialize};
@@ -15,6 +16,7 @@ use crate::passes::{
 use crate::resource::Copy::{self, Current, Previous};
 use crate::resource::{Access, Kind, Lifetime, Resource};
 use crate::settings::Settings;
+use crate::variants::Variants;
 
 /// When in the frame a pass runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -118,10 +120,15 @@ impl Turns {
     }
 }
 
-fn plan_pass(template: &PassTemplate, settings: &Settings, sources: &Sources) -> Result<(Pass, Kernel), Error> {
+fn plan_pass<K: AsRef<Kernel>>(
+    template: &PassTemplate,
+    settings: &Settings,
+    make: &mut impl FnMut(&PassTemplate, &Overrides) -> Result<K, Error>,
+) -> Result<(Pass, K), Error> {
     let overrides: Overrides =
         template.overrides.iter().map(|&name| (name.to_owned(), override_value(settings, name))).collect();
-    let kernel = Kernel::from_sources(template.kernel, &overrides, sources)?.renamed(template.name);
+    let made = make(template, &overrides)?;
+    let kernel = made.as_ref();
     let mut bindings = Vec::new();
     for binding in &kernel.bindings {
         let (resource, copy) = template
@@ -152,7 +159,7 @@ fn plan_pass(template: &PassTemplate, settings: &Settings, sources: &Sources) ->
     };
     let (name, kernel_name) = (template.name.to_owned(), template.kernel.to_owned());
     let pass = Pass { name, kernel: kernel_name, stage: template.stage, overrides, grid, bindings };
-    Ok((pass, kernel))
+    Ok((pass, made))
 }
 
 impl Plan {
@@ -173,13 +180,34 @@ impl Plan {
     ///
     /// As [`Plan::new`]; [`Error::Kernel`] with file and line for mistakes in the sources.
     pub fn from_sources(settings: &Settings, size: UVec2, sources: &Sources) -> Result<(Self, Vec<Kernel>), Error> {
+        Self::with_kernels(settings, size, |template, overrides| {
+            Ok(Kernel::from_sources(template.kernel, overrides, sources)?.renamed(template.name))
+        })
+    }
+
+    /// The same with the built-in kernels, those taken from `variants` that it has.
+    pub(crate) fn from_variants(
+        settings: &Settings,
+        size: UVec2,
+        variants: &mut Variants,
+    ) -> Result<(Self, Vec<Arc<Kernel>>), Error> {
+        Self::with_kernels(settings, size, |template, overrides| {
+            variants.kernel(template.name, template.kernel, overrides)
+        })
+    }
+
+    fn with_kernels<K: AsRef<Kernel>>(
+        settings: &Settings,
+        size: UVec2,
+        mut make: impl FnMut(&PassTemplate, &Overrides) -> Result<K, Error>,
+    ) -> Result<(Self, Vec<K>), Error> {
         settings.validate()?;
         check_allocation(size)?;
         let mut passes = Vec::new();
         let mut kernels = Vec::new();
         let mut turns = Turns::default();
         for template in templates(settings.pipeline).into_iter().filter(|template| (template.is_needed)(settings)) {
-            let (mut pass, kernel) = plan_pass(template, settings, sources)?;
+            let (mut pass, kernel) = plan_pass(template, settings, &mut make)?;
             turns.take(&mut pass.bindings);
             passes.push(pass);
             kernels.push(kernel);
@@ -206,6 +234,15 @@ impl Plan {
             }
             resource.exported = EXPORTED.contains(&resource.name.as_str()) || Some(&resource.name) == output.as_ref();
         }
+    }
+
+    /// Whether the plans differ in values of override constants at most: resources and bindings are the same.
+    pub fn is_like(&self, other: &Self) -> bool {
+        let is_like = |a: &Pass, b: &Pass| Pass { overrides: b.overrides.clone(), ..a.clone() } == *b;
+        self.size == other.size
+            && self.resources == other.resources
+            && self.passes.len() == other.passes.len()
+            && self.passes.iter().zip(&other.passes).all(|(a, b)| is_like(a, b))
     }
 
     /// The denoised image when a frame has run: resource and copy. `None` for a plan without one.

@@ -9,7 +9,7 @@ use limpid::plan::{Grid, Stage};
 use limpid::resource::{Access, Kind};
 use limpid::settings::{Fallback, Pipeline, RayList};
 use limpid::synchronization::Usage;
-use limpid::{Camera, DebugView, Denoiser, Error, FrameInputs, Plan, Preset, Settings};
+use limpid::{Camera, Change, DebugView, Denoiser, Error, FrameInputs, Plan, Preset, Settings};
 use proptest::prelude::*;
 
 mod any_settings;
@@ -230,12 +230,16 @@ fn constants_change_without_a_new_plan() {
     denoiser.finish_frame();
     let mut settings = Settings::default();
     settings.resolve.stability = 0.25;
-    assert!(!denoiser.set_settings(&settings).unwrap());
+    assert_eq!(denoiser.set_settings(&settings).unwrap(), Change::Constants);
     let constants = denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap().constants;
     assert_eq!((constants.stability, constants.prev_size), (0.25, size.to_array()));
     denoiser.finish_frame();
+    settings.features.near_taps = 3;
+    assert_eq!(denoiser.set_settings(&settings).unwrap(), Change::Kernels);
+    assert_eq!(denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap().constants.prev_size, size.to_array());
+    denoiser.finish_frame();
     settings.coverage.fallback = Fallback::Black;
-    assert!(denoiser.set_settings(&settings).unwrap());
+    assert_eq!(denoiser.set_settings(&settings).unwrap(), Change::Plan);
     assert_eq!(denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap().constants.prev_size, [0, 0]);
 }
 

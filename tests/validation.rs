@@ -41,6 +41,8 @@ fn frames_sizes_and_settings_change_without_a_message() {
         case.steps[5].change = Change::Settings(Box::new(other.clone()));
         other.footprint.filter_scale = 0.2;
         case.steps[6].change = Change::Settings(Box::new(other.clone()));
+        other.features.near_taps = 3;
+        case.steps[7].change = Change::Settings(Box::new(other.clone()));
         other.pipeline = Pipeline::Published;
         case.steps[8].change = Change::Settings(Box::new(other));
         case.run(&mut ash);

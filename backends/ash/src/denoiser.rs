@@ -5,14 +5,15 @@ use glam::UVec2;
 use limpid::kernel::Binding;
 use limpid::plan::{DEBUG_VIEW, Grid, Stage};
 use limpid::resource::Copy;
-use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
+use limpid::variants::Made;
+use limpid::{Change, FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
 use crate::barrier::{Batch, Side};
 use crate::descriptors::{InputSets, OwnSets};
 use crate::gpu::{Gpu, Shared};
 use crate::inputs::Inputs;
 use crate::memory::MemorySource;
-use crate::pipelines::{Pipelines, stage_index};
+use crate::pipelines::{Pipeline, Pipelines, stage_index};
 use crate::resources::{Buffer, Resources};
 use crate::timing::{PassTime, Timing};
 use crate::{Error, Options};
@@ -75,6 +76,8 @@ pub struct Denoiser {
     core: limpid::Denoiser,
     barriers: Vec<Option<limpid::synchronization::Barrier>>,
     pipelines: Pipelines,
+    /// Pipelines of all kernels that the core keeps.
+    made: Made<Arc<Pipeline>>,
     sized: Sized,
     constants: Buffer,
     constants_stride: u64,
@@ -91,6 +94,7 @@ pub struct Denoiser {
 /// Kept only to be dropped later.
 enum Retired {
     Sized(#[expect(dead_code, reason = "dropped in time")] Box<Sized>),
+    Pipelines(#[expect(dead_code, reason = "dropped in time")] Vec<Arc<Pipeline>>),
     Denoiser(#[expect(dead_code, reason = "dropped in time")] Box<Denoiser>),
 }
 
@@ -141,12 +145,17 @@ impl Denoiser {
     ) -> Result<Self, Error> {
         let synchronization = options.synchronization.clone();
         let shared = Shared::new(gpu, memory, synchronization, options.debug_utils.clone())?;
-        Self::on(Arc::new(shared), core, options)
+        Self::on(Arc::new(shared), core, options, Made::default())
     }
 
-    fn on(gpu: Arc<Shared>, core: limpid::Denoiser, options: Options) -> Result<Self, Error> {
+    fn on(
+        gpu: Arc<Shared>,
+        core: limpid::Denoiser,
+        options: Options,
+        mut made: Made<Arc<Pipeline>>,
+    ) -> Result<Self, Error> {
         let frames_in_flight = options.frames_in_flight.max(1);
-        let pipelines = Pipelines::new(&gpu, core.plan(), core.kernels(), &options)?;
+        let pipelines = Pipelines::new(&gpu, core.plan(), core.kernels(), &options, &mut made)?;
         let sized = new_sized(&gpu, core.plan(), &pipelines, &options)?;
         let alignment = gpu.limits.min_uniform_buffer_offset_alignment.max(1);
         let constants_stride = (size_of::<FrameConstants>() as u64).next_multiple_of(alignment);
@@ -161,6 +170,7 @@ impl Denoiser {
             options,
             core,
             pipelines,
+            made,
             sized,
             constants,
             constants_stride,
@@ -198,25 +208,55 @@ impl Denoiser {
         Ok(())
     }
 
-    /// Changes settings. Numbers take effect with the next frame; what changes the plan makes everything anew
-    /// and loses history. What was there before is kept as in [`resize`](Self::resize).
+    /// Changes settings. Takes effect with the next frame. Pipelines that were made before are used again:
+    /// [`prepare`](Self::prepare) makes them ahead. Numbers, and features that change no binding, such as
+    /// `near_taps`, keep history; others make resources anew and lose it. What was there before is kept as in
+    /// [`resize`](Self::resize).
     ///
     /// # Errors
     ///
     /// As [`new`](Self::new); nothing changes then.
     pub fn set_settings(&mut self, settings: &Settings) -> Result<(), Error> {
         let mut core = self.core.clone();
-        if !core.set_settings(settings)? {
-            self.core = core;
-            return Ok(());
+        match core.set_settings(settings)? {
+            Change::Constants => self.core = core,
+            Change::Kernels => {
+                let new = Pipelines::new(&self.gpu, core.plan(), core.kernels(), &self.options, &mut self.made)?;
+                // Sets of inputs are written with the layouts they were allocated with, which are like the new ones.
+                let old = std::mem::replace(&mut self.pipelines.passes, new.passes);
+                self.retired.push((self.frames + self.frames_in_flight(), Retired::Pipelines(old)));
+                self.core = core;
+            }
+            Change::Plan => {
+                let new = Self::on(Arc::clone(&self.gpu), core, self.options.clone(), self.made.clone())?;
+                let mut old = std::mem::replace(self, new);
+                self.retired = std::mem::take(&mut old.retired);
+                // From here on frames are counted from 0 again.
+                self.retired.iter_mut().for_each(|(until, _)| *until = until.saturating_sub(old.frames));
+                self.retired.push((self.frames_in_flight(), Retired::Denoiser(Box::new(old))));
+            }
         }
-        let new = Self::on(Arc::clone(&self.gpu), core, self.options.clone())?;
-        let mut old = std::mem::replace(self, new);
-        self.retired = std::mem::take(&mut old.retired);
-        // From here on frames are counted from 0 again.
-        self.retired.iter_mut().for_each(|(until, _)| *until = until.saturating_sub(old.frames));
-        self.retired.push((self.frames_in_flight(), Retired::Denoiser(Box::new(old))));
+        self.made.keep(self.core.variants());
         Ok(())
+    }
+
+    /// Makes pipelines for settings that may be set later, so that no frame has to wait for a compiler then. The
+    /// pipelines that were used last are kept: those of at most [`MAX_VARIANTS`](limpid::variants::MAX_VARIANTS)
+    /// kernels and those in use.
+    ///
+    /// # Errors
+    ///
+    /// As [`new`](Self::new).
+    pub fn prepare(&mut self, settings: &Settings) -> Result<(), Error> {
+        let (plan, kernels) = self.core.prepare(settings)?;
+        Pipelines::new(&self.gpu, &plan, &kernels, &self.options, &mut self.made)?;
+        self.made.keep(self.core.variants());
+        Ok(())
+    }
+
+    /// How many pipelines are kept.
+    pub fn pipelines(&self) -> usize {
+        self.made.len()
     }
 
     /// Records a whole frame.

@@ -6,6 +6,7 @@ use ash::vk;
 use limpid::emit::SpirvOptions;
 use limpid::kernel::{Binding, BindingKind, Kernel};
 use limpid::plan::{Plan, Stage};
+use limpid::variants::Made;
 
 use crate::gpu::Shared;
 use crate::{Error, Options};
@@ -63,6 +64,8 @@ pub(crate) struct Pipeline {
     pub(crate) layout: vk::PipelineLayout,
     /// Layout of set 1, limpid's own resources.
     pub(crate) own: SetLayout,
+    /// What the layout of set 0 holds.
+    inputs: Vec<Binding>,
 }
 
 impl Drop for Pipeline {
@@ -85,8 +88,15 @@ impl Pipeline {
         // SAFETY: both layouts are alive.
         let layout = unsafe { gpu.device.create_pipeline_layout(&info, None) }
             .map_err(Error::vulkan(format!("creating the pipeline layout of {label}")))?;
-        let mut pipeline =
-            Self { gpu: Arc::clone(gpu), pass: kernel.name, label, pipeline: vk::Pipeline::null(), layout, own };
+        let mut pipeline = Self {
+            gpu: Arc::clone(gpu),
+            pass: kernel.name,
+            label,
+            pipeline: vk::Pipeline::null(),
+            layout,
+            own,
+            inputs: inputs.bindings.clone(),
+        };
         let words = match &options.spirv {
             Some(source) => source(kernel)?,
             None => {
@@ -123,7 +133,7 @@ impl Pipeline {
 /// All pipelines of a plan.
 pub(crate) struct Pipelines {
     /// In the order of the passes.
-    pub(crate) passes: Vec<Pipeline>,
+    pub(crate) passes: Vec<Arc<Pipeline>>,
     /// Layout of set 0, the constants and the caller's images, of each stage.
     pub(crate) inputs: [SetLayout; 2],
 }
@@ -136,7 +146,14 @@ pub(crate) fn stage_index(stage: Stage) -> usize {
 }
 
 impl Pipelines {
-    pub(crate) fn new(gpu: &Arc<Shared>, plan: &Plan, kernels: &[Kernel], options: &Options) -> Result<Self, Error> {
+    /// Takes pipelines from `made`, and keeps new ones there.
+    pub(crate) fn new(
+        gpu: &Arc<Shared>,
+        plan: &Plan,
+        kernels: &[Arc<Kernel>],
+        options: &Options,
+        made: &mut Made<Arc<Pipeline>>,
+    ) -> Result<Self, Error> {
         let inputs = |stage| {
             let mut bindings: Vec<Binding> = Vec::new();
             let of_stage = plan.passes.iter().zip(kernels).filter(|(pass, _)| pass.stage == stage);
@@ -150,7 +167,14 @@ impl Pipelines {
         let inputs = [inputs(Stage::Classify)?, inputs(Stage::Denoise)?];
         let mut passes = Vec::new();
         for (pass, kernel) in plan.passes.iter().zip(kernels) {
-            passes.push(Pipeline::new(gpu, kernel, &inputs[stage_index(pass.stage)], options)?);
+            let inputs = &inputs[stage_index(pass.stage)];
+            let known = made.get(kernel).filter(|pipeline| pipeline.inputs == inputs.bindings).cloned();
+            let pipeline = match known {
+                Some(pipeline) => pipeline,
+                None => Arc::new(Pipeline::new(gpu, kernel, inputs, options)?),
+            };
+            made.insert(kernel, Arc::clone(&pipeline));
+            passes.push(pipeline);
         }
         Ok(Self { passes, inputs })
     }

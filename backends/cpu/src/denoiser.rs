@@ -1,10 +1,12 @@
 use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
 use glam::UVec2;
 use limpid::kernel::Kernel;
 use limpid::plan::{Bound, DEBUG_VIEW, Grid, Pass, Stage};
 use limpid::resource::{Copy, Format, Kind, Lifetime};
-use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
+use limpid::variants::Made;
+use limpid::{Change, FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
 use crate::{Binding, Buffer, CompileError, Error, Executor, Fault, Probe, TexelFormat, Texture};
 
@@ -60,7 +62,9 @@ enum Allocation {
 /// A denoiser on the CPU.
 pub struct Denoiser {
     core: limpid::Denoiser,
-    executors: Vec<Executor>,
+    executors: Vec<Arc<Executor>>,
+    /// The compiled form of all kernels that the core keeps.
+    made: Made<Arc<Executor>>,
     allocations: HashMap<String, Allocation>,
     constants: Buffer,
     /// Faults by kernel, when kernels are watched.
@@ -116,6 +120,19 @@ fn compile(kernel: &Kernel) -> Result<Executor, Error> {
     })
 }
 
+/// The compiled form of kernels: those of `made`, and new ones that are kept there.
+fn executors(kernels: &[Arc<Kernel>], made: &mut Made<Arc<Executor>>) -> Result<Vec<Arc<Executor>>, Error> {
+    let executor = |kernel| {
+        if let Some(executor) = made.get(kernel) {
+            return Ok(Arc::clone(executor));
+        }
+        let executor = Arc::new(compile(kernel)?);
+        made.insert(kernel, Arc::clone(&executor));
+        Ok(executor)
+    };
+    kernels.iter().map(executor).collect()
+}
+
 impl Denoiser {
     /// Compiles kernels and allocates memory for images of up to `size` pixels.
     ///
@@ -132,10 +149,14 @@ impl Denoiser {
     ///
     /// [`Error::Compile`].
     pub fn with_core(core: limpid::Denoiser) -> Result<Self, Error> {
-        let executors = core.kernels().iter().map(compile).collect::<Result<_, _>>()?;
+        Self::with_executors(core, Made::default())
+    }
+
+    fn with_executors(core: limpid::Denoiser, mut made: Made<Arc<Executor>>) -> Result<Self, Error> {
+        let executors = executors(core.kernels(), &mut made)?;
         let allocations = allocate(core.plan());
         let constants = Buffer::zeroed(size_of::<FrameConstants>() / 4);
-        Ok(Self { core, executors, allocations, constants, faults: None, probes: None })
+        Ok(Self { core, executors, made, allocations, constants, faults: None, probes: None })
     }
 
     /// What is allocated and dispatched.
@@ -154,20 +175,39 @@ impl Denoiser {
         Ok(())
     }
 
-    /// Changes settings. Numbers take effect with the next frame; what changes the plan makes everything anew
-    /// and loses history.
+    /// Changes settings. Takes effect with the next frame. Kernels that were compiled before are used again. Numbers,
+    /// and features that change no binding, such as `near_taps`, keep history; others make all memory anew.
     ///
     /// # Errors
     ///
     /// As [`Denoiser::new`]; nothing changes then.
     pub fn set_settings(&mut self, settings: &Settings) -> Result<(), Error> {
         let mut core = self.core.clone();
-        if core.set_settings(settings)? {
-            let (faults, probes) = (self.faults.take(), self.probes.take());
-            *self = Self { faults, probes, ..Self::with_core(core)? };
-        } else {
-            self.core = core;
+        match core.set_settings(settings)? {
+            Change::Constants => self.core = core,
+            Change::Kernels => {
+                self.executors = executors(core.kernels(), &mut self.made)?;
+                self.core = core;
+            }
+            Change::Plan => {
+                let new = Self::with_executors(core, self.made.clone())?;
+                let (faults, probes) = (self.faults.take(), self.probes.take());
+                *self = Self { faults, probes, ..new };
+            }
         }
+        self.made.keep(self.core.variants());
+        Ok(())
+    }
+
+    /// Compiles kernels for settings that may be set later.
+    ///
+    /// # Errors
+    ///
+    /// As [`Denoiser::new`].
+    pub fn prepare(&mut self, settings: &Settings) -> Result<(), Error> {
+        let (_, kernels) = self.core.prepare(settings)?;
+        executors(&kernels, &mut self.made)?;
+        self.made.keep(self.core.variants());
         Ok(())
     }
 
@@ -235,10 +275,11 @@ impl Denoiser {
     }
 
     /// Makes functions as inexact as Vulkan lets devices be; see [`Executor::with_inexact_functions`]. Lasts until a
-    /// change of settings that makes everything anew.
+    /// change of settings that changes kernels.
     pub fn make_inexact(&mut self, seed: u32) {
-        let executors = std::mem::take(&mut self.executors);
-        self.executors = executors.into_iter().map(|executor| executor.with_inexact_functions(seed)).collect();
+        for executor in &mut self.executors {
+            *executor = Arc::new(Executor::clone(executor).with_inexact_functions(seed));
+        }
     }
 
     /// From now on runs kernels one workgroup after another and watches them; see
@@ -365,7 +406,7 @@ mod tests {
                 let naga::TypeInner::Image { class, arrayed, .. } = kernel.module.types[variable.ty].inner else {
                     continue;
                 };
-                let mut changed = kernel.clone();
+                let mut changed = Kernel::clone(kernel);
                 let inner = naga::TypeInner::Image { dim: naga::ImageDimension::D3, class, arrayed };
                 let ty = changed.module.types.insert(naga::Type { name: None, inner }, naga::Span::UNDEFINED);
                 changed.module.global_variables[handle].ty = ty;

@@ -32,7 +32,7 @@ impl<'a> Binding<'a> {
 }
 
 /// A compiled compute kernel.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Executor {
     code: Code,
 }

@@ -1,9 +1,10 @@
 use glam::UVec2;
 use limpid::plan::{Bound, DEBUG_VIEW, Grid, Stage};
 use limpid::resource::Copy;
-use limpid::{FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
+use limpid::variants::Made;
+use limpid::{Change, FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
-use crate::pipelines::Pipeline;
+use crate::pipelines::{Pipeline, pipelines};
 use crate::textures::Allocations;
 use crate::timing::{PassTime, Timing};
 use crate::{Error, Inputs};
@@ -49,6 +50,8 @@ pub struct Denoiser {
     options: Options,
     core: limpid::Denoiser,
     pipelines: Vec<Pipeline>,
+    /// Pipelines of all kernels that the core keeps.
+    made: Made<Pipeline>,
     allocations: Allocations,
     constants: wgpu::Buffer,
     constants_stride: u64,
@@ -139,11 +142,20 @@ impl Denoiser {
     ///
     /// [`Error::Feature`], [`Error::Limit`].
     pub fn with_core(device: &wgpu::Device, core: limpid::Denoiser, options: Options) -> Result<Self, Error> {
+        Self::with_pipelines(device, core, Made::default(), options)
+    }
+
+    fn with_pipelines(
+        device: &wgpu::Device,
+        core: limpid::Denoiser,
+        mut made: Made<Pipeline>,
+        options: Options,
+    ) -> Result<Self, Error> {
         if options.timestamps && !device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             return Err(Error::Feature { option: "timestamps", feature: wgpu::Features::TIMESTAMP_QUERY });
         }
         let allocations = Allocations::new(device, core.plan(), options.readable_intermediates)?;
-        let pipelines: Vec<_> = core.kernels().iter().map(|kernel| Pipeline::new(device, kernel)).collect();
+        let pipelines = pipelines(device, core.kernels(), &mut made);
         let own_groups = own_groups(device, core.plan(), &pipelines, &allocations);
         let alignment = u64::from(device.limits().min_uniform_buffer_offset_alignment);
         let constants_stride = (size_of::<FrameConstants>() as u64).next_multiple_of(alignment);
@@ -159,6 +171,7 @@ impl Denoiser {
             input_groups: pipelines.iter().map(|_| InputGroups::default()).collect(),
             core,
             pipelines,
+            made,
             allocations,
             constants,
             constants_stride,
@@ -182,20 +195,46 @@ impl Denoiser {
         Ok(())
     }
 
-    /// Changes settings. Numbers take effect with the next frame; what changes the plan makes everything anew
-    /// and loses history.
+    /// Changes settings. Takes effect with the next frame. Pipelines that were made before are used again:
+    /// [`prepare`](Self::prepare) makes them ahead. Numbers, and features that change no binding, such as
+    /// `near_taps`, keep history; others make resources anew and lose it.
     ///
     /// # Errors
     ///
     /// As [`Denoiser::new`]; nothing changes then.
     pub fn set_settings(&mut self, settings: &Settings) -> Result<(), Error> {
         let mut core = self.core.clone();
-        if core.set_settings(settings)? {
-            *self = Self::with_core(&self.device, core, self.options)?;
-        } else {
-            self.core = core;
+        match core.set_settings(settings)? {
+            Change::Constants => self.core = core,
+            Change::Kernels => {
+                self.pipelines = pipelines(&self.device, core.kernels(), &mut self.made);
+                self.core = core;
+            }
+            Change::Plan => {
+                *self = Self::with_pipelines(&self.device, core, self.made.clone(), self.options)?;
+            }
         }
+        self.made.keep(self.core.variants());
         Ok(())
+    }
+
+    /// Makes pipelines for settings that may be set later, so that no frame has to wait for a compiler then. The
+    /// pipelines that were used last are kept: those of at most [`MAX_VARIANTS`](limpid::variants::MAX_VARIANTS)
+    /// kernels and those in use.
+    ///
+    /// # Errors
+    ///
+    /// As [`Denoiser::new`].
+    pub fn prepare(&mut self, settings: &Settings) -> Result<(), Error> {
+        let (_, kernels) = self.core.prepare(settings)?;
+        pipelines(&self.device, &kernels, &mut self.made);
+        self.made.keep(self.core.variants());
+        Ok(())
+    }
+
+    /// How many pipelines are kept.
+    pub fn pipelines(&self) -> usize {
+        self.made.len()
     }
 
     /// Records a whole frame.

@@ -1,13 +1,16 @@
 //! Pipelines and their layouts, from the core's reflection.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use limpid::kernel::{Binding, BindingKind, Kernel};
 use limpid::resource::Access;
+use limpid::variants::Made;
 
 use crate::textures::texture_format;
 
 /// One pass on the device.
+#[derive(Debug, Clone)]
 pub(crate) struct Pipeline {
     pub(crate) label: String,
     pub(crate) pipeline: wgpu::ComputePipeline,
@@ -57,8 +60,21 @@ fn group_layout(device: &wgpu::Device, label: &str, bindings: &[Binding], group:
     (!entries.is_empty()).then(|| device.create_bind_group_layout(&descriptor))
 }
 
+/// The pipelines of kernels: those of `made`, and new ones that are kept there.
+pub(crate) fn pipelines(device: &wgpu::Device, kernels: &[Arc<Kernel>], made: &mut Made<Pipeline>) -> Vec<Pipeline> {
+    let pipeline = |kernel| {
+        if let Some(pipeline) = made.get(kernel) {
+            return pipeline.clone();
+        }
+        let pipeline = Pipeline::new(device, kernel);
+        made.insert(kernel, pipeline.clone());
+        pipeline
+    };
+    kernels.iter().map(pipeline).collect()
+}
+
 impl Pipeline {
-    pub(crate) fn new(device: &wgpu::Device, kernel: &Kernel) -> Self {
+    fn new(device: &wgpu::Device, kernel: &Kernel) -> Self {
         let label = format!("limpid.{}", kernel.name);
         let groups = [0, 1].map(|group| group_layout(device, &label, &kernel.bindings, group));
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {

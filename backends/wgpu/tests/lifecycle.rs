@@ -6,6 +6,7 @@ use std::sync::mpsc;
 
 use glam::UVec2;
 use limpid::settings::Fallback;
+use limpid::variants::MAX_VARIANTS;
 use limpid_wgpu::{Denoiser, FRAMES_BEFORE_SUBMIT, Options, PassTime};
 use support::{Denoised, Gpu, Images, Run, Scene, linear_settings, published_settings, still_frame};
 
@@ -41,6 +42,49 @@ fn numbers_take_effect_at_once_and_keep_history() {
     let refused = run.denoiser.set_settings(&settings).unwrap_err();
     assert!(refused.to_string().contains("`footprint.filter_scale` is 20"), "{refused}");
     assert!(run.still(&scene(4)).length.iter().all(|length| *length == 5.0));
+}
+
+#[test]
+fn features_that_change_no_binding_keep_history() {
+    let Some(gpu) = Gpu::open() else { return };
+    let mut fewer = linear_settings();
+    fewer.features.near_taps = 3;
+    let mut run = Run::new(&gpu, &linear_settings(), SIZE);
+    let mut unchanged = Run::new(&gpu, &linear_settings(), SIZE);
+    for (index, settings) in [&fewer, &linear_settings(), &fewer, &linear_settings()].into_iter().enumerate() {
+        run.denoiser.set_settings(settings).unwrap();
+        // Smooth enough for near taps to count.
+        let mut scene = scene(index as u32);
+        scene.pixels.iter_mut().for_each(|pixel| pixel.roughness = 0.2);
+        let (changed, unchanged) = (run.still(&scene), unchanged.still(&scene));
+        assert!(changed.length == unchanged.length);
+        assert_eq!(changed.output == unchanged.output, index % 2 == 1, "frame {index}");
+    }
+}
+
+#[test]
+fn pipelines_are_made_once_and_not_kept_without_end() {
+    let Some(gpu) = Gpu::open() else { return };
+    let mut denoiser = Denoiser::new(&gpu.device, &linear_settings(), SIZE, Options::default()).unwrap();
+    let passes = denoiser.plan().passes.len();
+    assert_eq!(denoiser.pipelines(), passes);
+    let mut narrow = linear_settings();
+    narrow.features.wide_filter = false;
+    denoiser.prepare(&narrow).unwrap();
+    // All other passes have the same kernels.
+    assert_eq!(denoiser.pipelines(), passes + 1);
+    denoiser.prepare(&published_settings()).unwrap();
+    let prepared = denoiser.pipelines();
+    for settings in [narrow, published_settings(), linear_settings()] {
+        denoiser.set_settings(&settings).unwrap();
+        assert_eq!(denoiser.pipelines(), prepared);
+    }
+    for near_taps in 0..=64 {
+        let mut settings = linear_settings();
+        settings.features.near_taps = near_taps;
+        denoiser.set_settings(&settings).unwrap();
+    }
+    assert!(denoiser.pipelines() <= MAX_VARIANTS, "{}", denoiser.pipelines());
 }
 
 #[test]

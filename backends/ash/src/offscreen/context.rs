@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
+use limpid::variants::Made;
 
 use super::image::{LAYER, Use, change, texel_bytes};
 use super::instance::{DeviceRequest, Instance, device_name, open_device};
@@ -178,7 +179,8 @@ impl Context {
         let Some(extension) = &self.statistics else { return Ok(Vec::new()) };
         let mut shared = Shared::new(self.gpu(), self.memory(), self.synchronization(), self.debug_utils())?;
         shared.statistics = Some(extension.clone());
-        let pipelines = Pipelines::new(&Arc::new(shared), core.plan(), core.kernels(), &Options::default())?;
+        let (shared, options, mut made) = (Arc::new(shared), Options::default(), Made::default());
+        let pipelines = Pipelines::new(&shared, core.plan(), core.kernels(), &options, &mut made)?;
         let passes = pipelines.passes.iter().map(|pipeline| pipeline.statistics(extension));
         Ok(passes.collect::<Result<Vec<_>, _>>()?.concat())
     }

@@ -51,7 +51,7 @@ impl SlotKind {
 }
 
 /// A kernel ready to run.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Code {
     pub(crate) ops: Vec<Op>,
     /// Where in the source each instruction comes from.
