@@ -3,8 +3,8 @@
 //!
 //! in   radiance      any float    full    noisy input; a: hit distance
 //! in   motion        any float    full    uv motion of the surface (surface motion)
-//! in   guide         rg32uint     full    this frame's packed G-buffer
-//! in   prev_guide    r32uint      full    last frame's, in fewer bits
+//! in   guide         rg32uint     full    this frame's packed G-buffer, or normal, roughness, depth
+//! in   prev_guide    r32uint      full    last frame's, in fewer bits, or its normal, roughness, depth
 //! in   history       rgba16float  full    last frame's `history`
 //! in   blocks        rgba32uint   block   statistics of the input, excess of outliers spread over the footprint
 //! in   samples       rg32uint     block   largest luminances (outlier spread)
@@ -19,6 +19,7 @@
 
 import package::shared::frame;
 import package::shared::packing;
+import package::shared::gbuffer;
 import package::shared::radiance;
 import package::shared::outliers;
 import package::shared::tiles;
@@ -39,7 +40,6 @@ override OUTLIER_SPREAD: bool = true;
 
 @group(0) @binding(5) var in_motion: texture_2d<f32>;
 
-@group(1) @binding(0) var in_guide: texture_2d<u32>;
 @group(1) @binding(1) var in_prev_guide: texture_2d<u32>;
 @group(1) @binding(2) var in_history: texture_2d<f32>;
 @group(1) @binding(3) var in_blocks: texture_2d<u32>;
@@ -138,6 +138,13 @@ struct Tolerance {
     share: f32,
 }
 
+fn load_prev_guide(texel: vec2<i32>) -> Guide {
+    if GBUFFER_IS_COPIED {
+        return unpack_prev_guide(textureLoad(in_prev_guide, texel, 0).x);
+    }
+    return decoded_prev_guide(texel);
+}
+
 // Blends those of four texels that show the surface. The plane test is done in world space, so that a camera that
 // moves forward does not fail it.
 fn history_at(prev_uv: vec2<f32>, guide: Guide, position: vec3<f32>, share: f32, tolerance: Tolerance) -> Found {
@@ -155,7 +162,7 @@ fn history_at(prev_uv: vec2<f32>, guide: Guide, position: vec3<f32>, share: f32,
     for (var i = 0u; i < 4u; i++) {
         let offset = vec2<u32>(i & 1u, i >> 1u);
         let texel = clamp(vec2<i32>(base) + vec2<i32>(offset), vec2<i32>(0), last);
-        let tap = unpack_prev_guide(textureLoad(in_prev_guide, texel, 0).x);
+        let tap = load_prev_guide(texel);
         let history = unpack_history(textureLoad(in_history, texel, 0));
         let from_plane = dot(guide.normal, prev_world_position(texel, tap.depth) - position);
         let is_same = tap.denoised
@@ -340,7 +347,7 @@ fn accumulate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
     if any(pixel >= frame.size) {
         return;
     }
-    let guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
+    let guide = load_guide(pixel);
     var history = History(vec3<f32>(0.0), 0.0, 0.0, -1.0);
     if guide.denoised {
         history = accumulated(pixel, guide);

@@ -37,6 +37,14 @@ impl FrameSchedule {
     }
 }
 
+/// Whether last frame's G-buffer would say otherwise than it did then what was denoised.
+fn reads_otherwise(settings: &Settings, last: &Settings) -> bool {
+    settings.coverage.roughness_threshold != last.coverage.roughness_threshold
+        || settings.features.constant_roughness != last.features.constant_roughness
+        || settings.conventions.depth != last.conventions.depth
+        || settings.conventions.sky_distance != last.conventions.sky_distance
+}
+
 /// Decides passes, resources and constants. Backends own one and carry out what it says.
 #[derive(Debug, Clone)]
 pub struct Denoiser {
@@ -81,7 +89,8 @@ impl Denoiser {
     }
 
     /// Changes settings. Returns whether the plan changed, so that the backend has to make its pipelines and
-    /// resources anew; history is lost then. Otherwise only constants changed, and history is kept.
+    /// resources anew; history is lost then. Otherwise only constants changed, and history is kept; but where the caller
+    /// supplies last frame's G-buffer, a change of what it says is denoised loses it too.
     ///
     /// # Errors
     ///
@@ -90,9 +99,12 @@ impl Denoiser {
         let (plan, kernels) = Plan::new(settings, self.plan.size)?;
         // The length of stored history is counted in steps that depend on its limit.
         let rebuilt = plan != self.plan || settings.reproject.max_history != self.settings.reproject.max_history;
+        let rereads = !settings.features.gbuffer_copy && reads_otherwise(settings, &self.settings);
         self.settings = settings.clone();
         if rebuilt {
             (self.plan, self.kernels) = (plan, kernels);
+        }
+        if rebuilt || rereads {
             self.forget();
         }
         Ok(rebuilt)
@@ -111,6 +123,16 @@ impl Denoiser {
         Ok(())
     }
 
+    /// Size of the frame that `inputs` finds history of; zero where there is none. What the caller supplies of last
+    /// frame has to be as large; see [`input_size`](crate::resource::input_size).
+    pub fn prev_size(&self, inputs: &FrameInputs) -> UVec2 {
+        self.last_finished().filter(|_| !inputs.reset).map_or(UVec2::ZERO, |previous| previous.size)
+    }
+
+    fn last_finished(&self) -> Option<Previous> {
+        if self.started.is_some() { None } else { self.previous }
+    }
+
     fn forget(&mut self) {
         (self.previous, self.started) = (None, None);
     }
@@ -123,8 +145,7 @@ impl Denoiser {
     ///
     /// [`Error::Size`], [`Error::Camera`] or [`Error::FrameInput`]; the denoiser is as before then.
     pub fn next_frame(&mut self, inputs: &FrameInputs) -> Result<FrameSchedule, Error> {
-        let previous = if self.started.is_some() { None } else { self.previous };
-        let constants = frame::constants(&self.settings, inputs, self.plan.size, previous)?;
+        let constants = frame::constants(&self.settings, inputs, self.plan.size, self.last_finished())?;
         let phase = (self.frame_index % 2) as usize;
         self.frame_index = self.frame_index.wrapping_add(1);
         self.previous = Some(Previous { camera: inputs.camera, size: inputs.size });

@@ -34,6 +34,28 @@ pub(crate) const OUTPUT_VARIABLE: &str = "out_output";
 /// What the caller reads besides the denoised image: the debug view, and the ray list with its length.
 pub(crate) const EXPORTED: &[&str] = &[DEBUG_VIEW, "rays", "args"];
 
+/// What variables are that several kernels share.
+pub(crate) const SHARED_BINDINGS: &[(&str, &str, Copy)] = &[
+    ("frame", "frame", Current),
+    ("in_normal", "normal", Current),
+    ("in_roughness", "roughness", Current),
+    ("in_depth", "depth", Current),
+    ("in_prev_normal", "prev_normal", Current),
+    ("in_prev_roughness", "prev_roughness", Current),
+    ("in_prev_depth", "prev_depth", Current),
+    ("in_guide", "guide", Current),
+];
+
+/// Overrides of `kernels/shared/gbuffer.wgsl`.
+pub(crate) const GBUFFER_OVERRIDES: &[&str] = &[
+    "NORMAL_ENCODING",
+    "ROUGHNESS_CHANNEL",
+    "ROUGHNESS_IS_ALPHA",
+    "ROUGHNESS_IS_CONSTANT",
+    "GUIDE_IS_PACKED",
+    "GBUFFER_IS_COPIED",
+];
+
 /// A pass before it is known which of its bindings the specialised kernel keeps.
 pub(crate) struct PassTemplate {
     pub(crate) name: &'static str,
@@ -64,7 +86,6 @@ const FILL: PassTemplate = PassTemplate {
     bindings: &[
         ("in_radiance", "radiance", Current),
         ("in_environment", "environment", Current),
-        ("in_guide", "guide", Current),
         ("in_tiles", "tiles", Current),
         ("in_args", "args", Current),
         ("out_prev_guide", "prev_guide", Current),
@@ -82,18 +103,8 @@ const PASSES: &[PassTemplate] = &[
         is_needed: always,
         stage: Stage::Classify,
         grid: GridTemplate::Tiles,
-        overrides: &[
-            "NORMAL_ENCODING",
-            "ROUGHNESS_CHANNEL",
-            "ROUGHNESS_IS_ALPHA",
-            "ROUGHNESS_IS_CONSTANT",
-            "RAYS_PER_QUAD",
-            "RAYS_FOLLOW_VARIANCE",
-        ],
+        overrides: &["RAYS_PER_QUAD", "RAYS_FOLLOW_VARIANCE"],
         bindings: &[
-            ("in_normal", "normal", Current),
-            ("in_roughness", "roughness", Current),
-            ("in_depth", "depth", Current),
             ("in_history", LAST_OUTPUT, Current),
             ("out_guide", "guide", Current),
             ("out_tile_flags", "tile_flags", Current),
@@ -137,7 +148,6 @@ const PASSES: &[PassTemplate] = &[
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
-            ("in_guide", "guide", Current),
             ("in_prev_guide", "guide", Previous),
             ("in_history", OUTPUT, Current),
             ("in_prev_signal", "signal", Previous),
@@ -158,7 +168,6 @@ const PASSES: &[PassTemplate] = &[
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
-            ("in_guide", "guide", Current),
             ("in_prev_guide", "guide", Previous),
             ("in_history", OUTPUT, Current),
             ("in_reprojected", "signal", Current),
@@ -175,7 +184,6 @@ const PASSES: &[PassTemplate] = &[
         overrides: &[],
         bindings: &[
             ("in_radiance", "radiance", Current),
-            ("in_guide", "guide", Current),
             ("in_reprojected", "signal", Current),
             ("in_average", "average", Current),
             ("in_tiles", "tiles", Current),
@@ -194,7 +202,6 @@ const PASSES: &[PassTemplate] = &[
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_environment", "environment", Current),
-            ("in_guide", "guide", Current),
             ("in_reprojected", "signal", Current),
             ("in_prefiltered", "signal", Previous),
             ("in_average", "average", Current),
@@ -217,7 +224,6 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         overrides: &["OUTLIER_SPREAD", "SAMPLES_ARE_USED"],
         bindings: &[
             ("in_radiance", "radiance", Current),
-            ("in_guide", "guide", Current),
             ("in_tiles", "tiles", Current),
             ("in_args", "args", Current),
             ("out_blocks", BLOCKS, Current),
@@ -266,7 +272,6 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
-            ("in_guide", "guide", Current),
             ("in_prev_guide", "prev_guide", Current),
             ("in_history", "history", Previous),
             ("in_blocks", BLOCKS, Current),
@@ -288,7 +293,6 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
-            ("in_guide", "guide", Current),
             ("in_prev_guide", "prev_guide", Current),
             ("in_history", "history", Previous),
             ("in_blocks", BLOCKS, Current),
@@ -305,7 +309,6 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         grid: GridTemplate::List(3),
         overrides: &["ACCUMULATED"],
         bindings: &[
-            ("in_guide", "guide", Current),
             ("in_history", "history", Current),
             ("in_tiles", "tiles", Current),
             ("in_args", "args", Current),
@@ -337,7 +340,6 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_environment", "environment", Current),
-            ("in_guide", "guide", Current),
             ("in_history", "history", Current),
             ("in_blocks", BLOCKS, Current),
             ("in_tiles", "tiles", Current),
@@ -388,6 +390,9 @@ pub(crate) fn all_resources() -> Vec<Resource> {
         input("depth"),
         input("motion"),
         input("environment"),
+        input("prev_normal"),
+        input("prev_roughness"),
+        input("prev_depth"),
         resource("guide", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
         resource("prev_guide", texture(Format::R32Uint, Extent::Full), Lifetime::Persistent, false),
         resource("signal", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
@@ -436,8 +441,15 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         },
         "RAYS_FOLLOW_VARIANCE" => f64::from(ray_list.is_some_and(|list| list.variance_threshold.is_some())),
         "ROUGHNESS_IS_CONSTANT" => f64::from(features.constant_roughness.is_some()),
+        // The published pipeline's copy of the G-buffer is the packed guide.
+        "GUIDE_IS_PACKED" => {
+            let is_copy = settings.pipeline == Pipeline::Published && features.gbuffer_copy;
+            f64::from(features.packed_guide || is_copy)
+        }
+        "GBUFFER_IS_COPIED" => f64::from(features.gbuffer_copy),
         "AVERAGE_IS_USED" => f64::from(settings.pipeline == Pipeline::Published && features.uses_average()),
-        "PREV_GUIDE_IS_KEPT" | "BLOCKS_ARE_USED" => f64::from(settings.pipeline == Pipeline::Footprint),
+        "PREV_GUIDE_IS_KEPT" => f64::from(settings.pipeline == Pipeline::Footprint && features.gbuffer_copy),
+        "BLOCKS_ARE_USED" => f64::from(settings.pipeline == Pipeline::Footprint),
         // The template that names it means it.
         "ACCUMULATED" => 1.0,
         "LIGHT_CHANGE" => f64::from(features.light_change),

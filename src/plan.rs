@@ -7,12 +7,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::frame::check_allocation;
-use crate::kernel::{Kernel, Overrides, Sources};
+use crate::kernel::{self, Kernel, Overrides, Sources};
 use crate::passes::{
-    ARGS_STRIDE, BLOCKS, EXPORTED, GridTemplate, OTHER_BLOCKS, OUTPUT_VARIABLE, PassTemplate, all_resources,
-    override_value, resource_of, templates,
+    ARGS_STRIDE, BLOCKS, EXPORTED, GBUFFER_OVERRIDES, GridTemplate, OTHER_BLOCKS, OUTPUT_VARIABLE, PassTemplate,
+    SHARED_BINDINGS, all_resources, override_value, resource_of, templates,
 };
-use crate::resource::Copy::{self, Current, Previous};
+use crate::resource::Copy::{self, Previous};
 use crate::resource::{Access, Kind, Lifetime, Resource};
 use crate::settings::Settings;
 
@@ -119,17 +119,19 @@ impl Turns {
 }
 
 fn plan_pass(template: &PassTemplate, settings: &Settings, sources: &Sources) -> Result<(Pass, Kernel), Error> {
-    let overrides: Overrides =
-        template.overrides.iter().map(|&name| (name.to_owned(), override_value(settings, name))).collect();
+    let linked = kernel::link(template.kernel, sources)?;
+    let shared = GBUFFER_OVERRIDES.iter().filter(|name| linked.text.contains(&format!("override {name}:")));
+    let names = template.overrides.iter().chain(shared);
+    let overrides: Overrides = names.map(|&name| (name.to_owned(), override_value(settings, name))).collect();
     let kernel = Kernel::from_sources(template.kernel, &overrides, sources)?.renamed(template.name);
     let mut bindings = Vec::new();
     for binding in &kernel.bindings {
         let (resource, copy) = template
             .bindings
             .iter()
+            .chain(SHARED_BINDINGS)
             .find(|(variable, ..)| *variable == binding.name)
             .map(|&(_, resource, copy)| resource_of(settings.pipeline, resource, copy))
-            .or((binding.name == "frame").then_some(("frame", Current)))
             .ok_or_else(|| Error::Kernel {
                 kernel: template.kernel,
                 stage: "plan",
@@ -237,7 +239,7 @@ impl fmt::Display for Plan {
                 Kind::Buffer { stride, count, .. } => format!("{} x {stride} bytes", count.of(self.size)),
             };
             let pair = if resource.ping_pong { " pair" } else { "" };
-            writeln!(f, "  {:<14}{:?} {kind}{pair}", resource.name, resource.lifetime)?;
+            writeln!(f, "  {:<15}{:?} {kind}{pair}", resource.name, resource.lifetime)?;
         }
         for pass in &self.passes {
             let grid = match &pass.grid {

@@ -282,6 +282,13 @@ pub struct Features {
     pub near_taps: u32,
     /// Perceptual roughness, 0 to 1, where it is the same everywhere: then there is no `roughness` input.
     pub constant_roughness: Option<f32>,
+    /// Keeps what the next frame needs of the G-buffer. Without it the renderer, which double-buffers its own,
+    /// supplies last frame's as `prev_normal`, `prev_roughness` and `prev_depth`.
+    pub gbuffer_copy: bool,
+    /// Decodes the G-buffer once, into 8 bytes a pixel that all other passes read. Without it they decode `normal`,
+    /// `roughness` and `depth` themselves. In the published pipeline only together with `gbuffer_copy`, as there the
+    /// packed guide is the copy.
+    pub packed_guide: bool,
     /// Shows in colours what limpid finds out about each pixel, in one more pass and texture.
     pub debug_view: Option<DebugView>,
 }
@@ -301,6 +308,8 @@ impl Default for Features {
             wide_filter: true,
             near_taps: 12,
             constant_roughness: None,
+            gbuffer_copy: true,
+            packed_guide: true,
             debug_view: None,
         }
     }

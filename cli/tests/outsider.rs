@@ -90,7 +90,7 @@ fn write_sequence(case: &Case, folder: &Path) {
     fs::create_dir(folder).unwrap();
     let mut frames = Vec::new();
     for (number, step) in case.steps.iter().enumerate() {
-        for image in step.images.images() {
+        for image in case.images(number) {
             let path = folder.join(format!("{number}.{}.raw", image.name));
             fs::write(path, bytemuck::cast_slice::<u32, u8>(&image.words)).unwrap();
         }
@@ -105,9 +105,8 @@ fn write_sequence(case: &Case, folder: &Path) {
             "reset": frame.reset,
         }));
     }
-    let inputs: Vec<Value> = case.steps[0]
-        .images
-        .images()
+    let inputs: Vec<Value> = case
+        .images(0)
         .iter()
         .map(|image| {
             let (format, texel_bytes) = format(image.format);

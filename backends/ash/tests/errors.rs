@@ -106,6 +106,7 @@ fn inputs_that_do_not_fit_are_refused_and_nothing_is_recorded() {
         depth: single.input(),
         motion: wide.input(),
         environment: None,
+        previous: None,
     };
     let mut settings = Settings::default();
     // SAFETY: as above.
@@ -157,6 +158,7 @@ fn several_denoisers_live_on_one_device() {
         depth: &image,
         motion: &image,
         environment: None,
+        previous: None,
     };
     for _ in 0..2 {
         for session in &mut sessions {
