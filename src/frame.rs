@@ -202,9 +202,7 @@ fn pixel_to_view(camera: &Camera, size: DVec2, ndc_y: f64, sign: f64) -> (DMat4,
 fn depth_from_device(encoding: DepthEncoding, camera: &Camera) -> [f32; 4] {
     let p = camera.view_to_clip;
     match encoding {
-        DepthEncoding::Device | DepthEncoding::ReversedDevice => {
-            [p.w_axis.z, -p.w_axis.w, -p.z_axis.z, p.z_axis.w]
-        }
+        DepthEncoding::Device | DepthEncoding::ReversedDevice => [p.w_axis.z, -p.w_axis.w, -p.z_axis.z, p.z_axis.w],
         DepthEncoding::Linear => [0.0, 1.0, 1.0, 0.0],
     }
 }

@@ -21,6 +21,13 @@ const OFF: [(&str, Change); 5] = [
     ("constant_roughness", |features| features.constant_roughness = Some(0.3)),
 ];
 
+/// What is off costs memory of limpid's, in exchange for reads.
+const READ_INSTEAD: [(&str, Change); 3] = [
+    ("gbuffer_copy", |features| features.gbuffer_copy = false),
+    ("packed_guide", |features| features.packed_guide = false),
+    ("both", |features| (features.gbuffer_copy, features.packed_guide) = (false, false)),
+];
+
 /// Those that one of them has besides.
 fn off(pipeline: Pipeline) -> Vec<(&'static str, Change)> {
     let published: [(&str, Change); 3] = [
@@ -99,6 +106,29 @@ fn what_is_off_costs_nothing() {
                 if settings.validate().is_ok() {
                     assert!(Cost::of(&settings).is_within(&without), "{name} and {other_name}");
                 }
+            }
+        }
+    }
+}
+
+/// Less is fewer bytes, and no pass that was not there before: instructions and bindings may be more. What else is off costs
+/// no more than with everything on, whatever is read.
+#[test]
+fn what_is_read_instead_of_kept_costs_less_memory() {
+    for pipeline in [Pipeline::Footprint, Pipeline::Published] {
+        let (everything, bytes) =
+            (Cost::of(&with(pipeline, &[])), |pixel: u64| pixel * u64::from(SIZE.element_product()));
+        let copy = if pipeline == Pipeline::Footprint { 4 } else { 8 };
+        // The copy of the published pipeline is the packed guide.
+        let packed = if pipeline == Pipeline::Footprint { 8 } else { 0 };
+        for ((name, change), saved) in READ_INSTEAD.into_iter().zip([copy, packed, copy + 8]) {
+            let reading = Cost::of(&with(pipeline, &[change]));
+            println!("{name}: {} of {} words, {} bytes", reading.words(), everything.words(), reading.bytes);
+            assert_eq!(reading.bytes + bytes(saved), everything.bytes, "{name}");
+            assert!(reading.passes.iter().map(|(pass, ..)| pass).eq(everything.passes.iter().map(|(pass, ..)| pass)));
+            for (other_name, other) in off(pipeline) {
+                let without = Cost::of(&with(pipeline, &[change, other]));
+                assert!(without.is_within(&reading), "{other_name} with {name}");
             }
         }
     }

@@ -71,6 +71,20 @@ proptest! {
         let features = &settings.features;
         prop_assert_eq!(plan.inputs().any(|i| i == "motion"), features.surface_motion);
         let is_published = settings.pipeline == Pipeline::Published;
+        let has_input = |name: &str| plan.inputs().any(|input| input == name);
+        prop_assert_eq!(has_input("prev_normal"), !features.gbuffer_copy);
+        prop_assert_eq!(has_input("prev_depth"), !features.gbuffer_copy);
+        let reads_prev_roughness = !features.gbuffer_copy && features.constant_roughness.is_none();
+        prop_assert_eq!(has_input("prev_roughness"), reads_prev_roughness);
+        prop_assert_eq!(plan.resource("prev_guide").is_some(), !is_published && features.gbuffer_copy);
+        let has_guide = features.packed_guide || (is_published && features.gbuffer_copy);
+        prop_assert_eq!(plan.resource("guide").is_some(), has_guide);
+        for pass in &plan.passes {
+            // The least that WebGPU offers a stage.
+            let sampled = pass.bindings.iter().filter(|b| b.access == Access::Read);
+            let textures = sampled.filter(|b| !matches!(b.variable.as_str(), "frame" | "in_tiles" | "in_args"));
+            prop_assert!(textures.count() <= 16, "{}", pass.name);
+        }
         let has_pass = |kernel: &str| plan.passes.iter().any(|pass| pass.kernel == kernel);
         prop_assert_eq!(plan.inputs().any(|i| i == "roughness"), features.constant_roughness.is_none());
         prop_assert_eq!(has_pass("prefilter"), is_published && features.spatial_filter);
@@ -115,6 +129,11 @@ fn memory_stays_within_the_published_figure() {
     let pixels = f64::from(SIZE.x) * f64::from(SIZE.y);
     let bytes_per_pixel = (plan.memory().total() - counters_and_grids) as f64 / pixels;
     assert!(bytes_per_pixel - prev_guide <= 32.25, "{bytes_per_pixel}");
+    // 24.25 with last frame's G-buffer from the renderer, and this frame's read where it is.
+    let mut settings = Preset::Reference.settings();
+    (settings.features.gbuffer_copy, settings.features.packed_guide) = (false, false);
+    let (plan, _) = Plan::new(&settings, SIZE).unwrap();
+    assert!((plan.memory().total() - counters_and_grids) as f64 / pixels <= 24.25);
     // 32.25 at most with all that is kept of last frame's G-buffer.
     let (plan, _) = Plan::new(&Settings::default(), SIZE).unwrap();
     assert!(plan.bytes_per_pixel() <= 32.25, "{}", plan.bytes_per_pixel());

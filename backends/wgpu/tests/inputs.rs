@@ -134,7 +134,6 @@ fn assert_may_be_compact(gpu: &Gpu, settings: &Settings) {
             depth: cleared_depth(gpu, format, 0.5),
             motion: gpu.upload(SIZE, Rg16Float, &halves(&texels(&|p| p.motion.to_array().to_vec()))),
             environment: None,
-            previous: None,
         };
         let frame = still_frame(SIZE);
         let (expected, actual) = (wide.frame(&scene, &frame), compact.images(&images, &frame));

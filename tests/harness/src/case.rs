@@ -88,7 +88,7 @@ impl Images {
     }
 
     /// The images of all inputs of a frame, environment and last frame's G-buffer included.
-    fn images(&self, previous: &Self) -> Vec<Image> {
+    pub fn images(&self, previous: &Self) -> Vec<Image> {
         let mut images = self.own_images();
         let renamed = |image: Image| {
             let name = match image.name {
@@ -204,13 +204,19 @@ impl Case {
     /// The same for a plan that is not the settings' own.
     pub fn run_plan(&self, executor: &mut dyn Executor, core: limpid::Denoiser) -> Vec<Snapshot> {
         executor.start(core);
+        let mut size = self.size;
         let frame = |(index, step): (usize, &Step)| {
             match &step.change {
                 Change::None => {}
-                Change::Resize(size) => executor.resize(*size),
+                Change::Resize(to) => {
+                    size = *to;
+                    executor.resize(size);
+                }
                 Change::Settings(settings) => executor.set_settings(settings),
             }
-            executor.frame(&self.images(index), &step.frame)
+            let mut snapshot = executor.frame(&self.images(index), &step.frame);
+            snapshot.note_listed(size, step.frame.size);
+            snapshot
         };
         self.steps.iter().enumerate().map(frame).collect()
     }
