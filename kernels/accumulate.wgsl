@@ -6,7 +6,7 @@
 //! in   guide         rg32uint     full    this frame's packed G-buffer, or normal, roughness, depth
 //! in   prev_guide    r32uint      full    last frame's, in fewer bits, or its normal, roughness, depth
 //! in   history       rgba16float  full    last frame's `history`
-//! in   blocks        rgba32uint   block   statistics of the input, excess of outliers spread over the footprint
+//! in   blocks        rgba32uint   block   statistics of the input, excess of outliers spread over the footprint (block statistics)
 //! in   samples       rg32uint     block   largest luminances (outlier spread)
 //! in   light         r32uint      block   whether the light changed (light change)
 //! in   tiles, args   lists                tiles to denoise
@@ -37,6 +37,8 @@ override HISTORY_CLIP: bool = true;
 override LIGHT_CHANGE: bool = true;
 // Cuts outliers off and adds what was cut off, spread.
 override OUTLIER_SPREAD: bool = true;
+// There are blocks of this frame's input to compare with.
+override BLOCK_STATISTICS: bool = true;
 
 @group(0) @binding(5) var in_motion: texture_2d<f32>;
 
@@ -63,6 +65,9 @@ const RARE: f32 = 2.0;
 // lamps in mirrors have edges, and the deviation across an edge bounds nothing.
 const MIRROR_WEIGHT: f32 = 20.0;
 const MIRROR_UP_TO: f32 = 0.03;
+
+// Deviation that a sample counts as having of which no block says one.
+const ALONE_DEVIATION: f32 = 0.1;
 
 // What the blocks around a pixel say about its surface.
 struct Surroundings {
@@ -235,9 +240,19 @@ struct Subject {
     share: f32,
 }
 
+// What a pixel knows of its surroundings by itself: the sample, and nothing about hit distances.
+fn alone(pixel: vec2<u32>) -> Surroundings {
+    return Surroundings(load_radiance(pixel), 0.5, vec3<f32>(0.0), ALONE_DEVIATION, 0.0);
+}
+
 fn subject_of(pixel: vec2<u32>, guide: Guide) -> Subject {
     let position = world_position(pixel, guide.depth);
-    let around = surroundings_of(pixel, plane_of(guide, position));
+    var around: Surroundings;
+    if BLOCK_STATISTICS {
+        around = surroundings_of(pixel, plane_of(guide, position));
+    } else {
+        around = alone(pixel);
+    }
     let distance = usable_hit_distance(textureLoad(in_radiance, pixel, 0).a);
     let own_share = select(around.share, hit_share(distance, camera_distance_of(position)), distance > 0.0);
     // Single hit distances of rough surfaces say little, and go with the colour of their sample.

@@ -35,7 +35,8 @@ pub struct FrameInputs {
     /// output are not exposed; it may change every frame. Output is half float: where exposed radiance near 1
     /// stands for more than 65504 or less than 0.0001, scale the input instead.
     pub exposure: f32,
-    /// Camera of the preceding frame, where it is not the one that was denoised last (frames were skipped).
+    /// Camera of the preceding frame, where it is not the one that was denoised last (frames were skipped). A G-buffer of
+    /// last frame that the caller supplies is of this camera.
     pub previous_camera: Option<Camera>,
 }
 

@@ -218,7 +218,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
     PassTemplate {
         name: "block_average",
         kernel: "block_average",
-        is_needed: always,
+        is_needed: has_input_blocks,
         stage: Stage::Denoise,
         grid: GridTemplate::List(3),
         overrides: &["OUTLIER_SPREAD", "SAMPLES_ARE_USED"],
@@ -233,7 +233,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
     PassTemplate {
         name: "block_statistics",
         kernel: "block_statistics",
-        is_needed: always,
+        is_needed: has_input_blocks,
         stage: Stage::Denoise,
         grid: GridTemplate::List(3),
         overrides: &["LIGHT_CHANGE", "SURFACE_MOTION"],
@@ -268,7 +268,14 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         is_needed: always,
         stage: Stage::Denoise,
         grid: GridTemplate::List(0),
-        overrides: &["MIRROR_PARALLAX", "SURFACE_MOTION", "HISTORY_CLIP", "LIGHT_CHANGE", "OUTLIER_SPREAD"],
+        overrides: &[
+            "MIRROR_PARALLAX",
+            "SURFACE_MOTION",
+            "HISTORY_CLIP",
+            "LIGHT_CHANGE",
+            "OUTLIER_SPREAD",
+            "BLOCK_STATISTICS",
+        ],
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
@@ -289,7 +296,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         is_needed: has_debug_view,
         stage: Stage::Denoise,
         grid: GridTemplate::Tiles,
-        overrides: &["VIEW", "MIRROR_PARALLAX", "SURFACE_MOTION", "OUTLIER_SPREAD"],
+        overrides: &["VIEW", "MIRROR_PARALLAX", "SURFACE_MOTION", "OUTLIER_SPREAD", "BLOCK_STATISTICS"],
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
@@ -360,6 +367,11 @@ pub(crate) fn templates(pipeline: Pipeline) -> Vec<&'static PassTemplate> {
 
 fn always(_: &Settings) -> bool {
     true
+}
+
+/// Whether a pass uses averages over blocks of the input.
+fn has_input_blocks(settings: &Settings) -> bool {
+    settings.features.compares_with_blocks() || settings.features.light_change
 }
 
 fn has_wide_filter(settings: &Settings) -> bool {
@@ -449,11 +461,15 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         "GBUFFER_IS_COPIED" => f64::from(features.gbuffer_copy),
         "AVERAGE_IS_USED" => f64::from(settings.pipeline == Pipeline::Published && features.uses_average()),
         "PREV_GUIDE_IS_KEPT" => f64::from(settings.pipeline == Pipeline::Footprint && features.gbuffer_copy),
-        "BLOCKS_ARE_USED" => f64::from(settings.pipeline == Pipeline::Footprint),
+        "BLOCKS_ARE_USED" => {
+            let has_blocks = has_input_blocks(settings) || has_wide_filter(settings);
+            f64::from(settings.pipeline == Pipeline::Footprint && has_blocks)
+        }
         // The template that names it means it.
         "ACCUMULATED" => 1.0,
         "LIGHT_CHANGE" => f64::from(features.light_change),
         "OUTLIER_SPREAD" => f64::from(features.outlier_spread),
+        "BLOCK_STATISTICS" => f64::from(features.compares_with_blocks()),
         "SAMPLES_ARE_USED" => f64::from(features.light_change || features.outlier_spread),
         "NEAR_TAPS" => f64::from(if features.spatial_filter { features.near_taps } else { 0 }),
         "WIDE_FILTER" => f64::from(has_wide_filter(settings)),

@@ -275,6 +275,10 @@ pub struct Features {
     /// Footprint pipeline: cuts outliers off and adds what was cut off, spread, up to a limit. An input without
     /// fireflies needs none of it.
     pub outlier_spread: bool,
+    /// Footprint pipeline: compares history with averages of this frame's input over blocks around the pixel, and takes
+    /// hit distances from there where single ones say little. Mirrors, whose samples hold no noise, need none. Only
+    /// without `outlier_spread` too is it left out, which needs them.
+    pub block_statistics: bool,
     /// Footprint pipeline: filters over blocks where the footprint is wider than a few pixels. A scene of smooth
     /// surfaces has no such footprints.
     pub wide_filter: bool,
@@ -305,6 +309,7 @@ impl Default for Features {
             average_mixing: true,
             light_change: true,
             outlier_spread: true,
+            block_statistics: true,
             wide_filter: true,
             near_taps: 12,
             constant_roughness: None,
@@ -321,6 +326,11 @@ impl Features {
         self.spatial_filter || self.history_clip || self.average_mixing
     }
 
+    /// Whether `accumulate` reads the blocks of the input.
+    pub(crate) fn compares_with_blocks(&self) -> bool {
+        self.block_statistics || self.outlier_spread
+    }
+
     fn validate(&self, pipeline: Pipeline) -> Result<(), Error> {
         let refuse = |reason| Err(Error::Features { reason });
         if !self.mirror_parallax && !self.surface_motion {
@@ -333,6 +343,12 @@ impl Features {
             return refuse(
                 "the debug view average needs an average: spatial_filter, history_clip or average_mixing has to be on",
             );
+        }
+        if self.debug_view == Some(DebugView::Average)
+            && pipeline == Pipeline::Footprint
+            && !self.compares_with_blocks()
+        {
+            return refuse("the debug view average needs an average: block_statistics or outlier_spread has to be on");
         }
         check_range("features.near_taps", self.near_taps as f32, 0.0, 64.0, "0 to 64")?;
         if let Some(roughness) = self.constant_roughness {

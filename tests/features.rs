@@ -35,11 +35,12 @@ fn off(pipeline: Pipeline) -> Vec<(&'static str, Change)> {
         ("edge_repair", |features| features.edge_repair = false),
         ("average_mixing", |features| features.average_mixing = false),
     ];
-    let footprint: [(&str, Change); 4] = [
+    let footprint: [(&str, Change); 5] = [
         ("light_change", |features| features.light_change = false),
         ("outlier_spread", |features| features.outlier_spread = false),
         ("wide_filter", |features| features.wide_filter = false),
         ("near_taps", |features| features.near_taps = 0),
+        ("block_statistics", |features| features.block_statistics = false),
     ];
     let own: &[_] = if pipeline == Pipeline::Published { &published } else { &footprint };
     OFF.iter().chain(own).copied().collect()
@@ -98,8 +99,9 @@ fn what_is_off_costs_nothing() {
             let without = Cost::of(&with(pipeline, &[change]));
             println!("{name}: {} of {} words, {} bytes", without.words(), everything.words(), without.bytes);
             assert!(without.is_within(&everything), "{name}: {without:?} and {everything:?}");
-            // The number of taps is a number.
-            assert!(without.words() < everything.words() || name == "near_taps", "{name}");
+            // The number of taps is a number; blocks are there for outliers too.
+            let is_same = ["near_taps", "block_statistics"].contains(&name);
+            assert!(without.words() < everything.words() || is_same, "{name}");
             // On top of each other too.
             for (other_name, other) in off(pipeline) {
                 let settings = with(pipeline, &[change, other]);

@@ -93,6 +93,11 @@ proptest! {
         prop_assert_eq!(plan.resource("light").is_some(), !is_published && features.light_change);
         prop_assert_eq!(plan.resource("debug_view").is_some(), features.debug_view.is_some());
         let spreads = usize::from(features.outlier_spread) + usize::from(features.spatial_filter && features.wide_filter);
+        let averages = usize::from(features.block_statistics || features.outlier_spread || features.light_change)
+            + usize::from(features.spatial_filter && features.wide_filter);
+        prop_assert_eq!(plan.resource("blocks").is_some(), !is_published && averages > 0);
+        let planned = plan.passes.iter().filter(|pass| pass.kernel == "block_average").count();
+        prop_assert_eq!(planned, if is_published { 0 } else { averages });
         let planned = plan.passes.iter().filter(|pass| pass.kernel == "block_spread").count();
         prop_assert_eq!(planned, if is_published { 0 } else { spreads });
         let names: HashSet<_> = plan.passes.iter().map(|pass| &pass.name).collect();
@@ -134,6 +139,13 @@ fn memory_stays_within_the_published_figure() {
     (settings.features.gbuffer_copy, settings.features.packed_guide) = (false, false);
     let (plan, _) = Plan::new(&settings, SIZE).unwrap();
     assert!((plan.memory().total() - counters_and_grids) as f64 / pixels <= 24.25);
+    // The smallest set: a pair for history, and lists of tiles.
+    let mut settings = Settings::default();
+    let features = &mut settings.features;
+    (features.gbuffer_copy, features.packed_guide, features.light_change) = (false, false, false);
+    (features.outlier_spread, features.block_statistics, features.wide_filter) = (false, false, false);
+    let (plan, _) = Plan::new(&settings, SIZE).unwrap();
+    assert!((plan.memory().total() - counters_and_grids) as f64 / pixels <= 16.125);
     // 32.25 at most with all that is kept of last frame's G-buffer.
     let (plan, _) = Plan::new(&Settings::default(), SIZE).unwrap();
     assert!(plan.bytes_per_pixel() <= 32.25, "{}", plan.bytes_per_pixel());
