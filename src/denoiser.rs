@@ -103,9 +103,10 @@ impl Denoiser {
         self.settings = settings.clone();
         if rebuilt {
             (self.plan, self.kernels) = (plan, kernels);
-        }
-        if rebuilt || rereads {
             self.forget();
+        }
+        if rereads {
+            self.previous = None;
         }
         Ok(rebuilt)
     }

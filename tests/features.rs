@@ -204,6 +204,45 @@ fn what_a_scene_does_not_use_changes_nothing() {
     assert!(full.iter().zip(&filtered).any(|(a, b)| a.output() != b.output()));
 }
 
+/// A packed guide rounds normals, and the footprint pipeline's copy of the G-buffer everything: as little as that is what
+/// comes out may differ. Which tiles are denoised is the same to the bit.
+#[test]
+fn a_gbuffer_read_where_it_is_says_what_a_kept_one_says() {
+    let executor = &mut *fastest();
+    for pipeline in [Pipeline::Footprint, Pipeline::Published] {
+        let mut case = Case::still(SIZE, 6, |frame, p| {
+            let value = 0.5 + noise(frame, p);
+            let tilt = [0.3 * noise(7, p / 16), 0.1, 1.0];
+            // Blocks of sky, and of surfaces beyond the threshold.
+            let depth = if noise(9, p / 8) < 0.1 { 0.0 } else { 4.0 };
+            let roughness = noise(8, p / 12);
+            Pixel { radiance: [value, 0.5 * value, 0.25, 3.0], normal: tilt, roughness, depth, ..Pixel::WALL }
+        });
+        case.settings.pipeline = pipeline;
+        case.settings.coverage.roughness_threshold = 0.8;
+        let full = run(&case, executor, &[]);
+        for (name, change) in READ_INSTEAD {
+            let reading = run(&case, executor, &[change]);
+            for (full, reading) in full.iter().zip(&reading) {
+                for list in ["tile_flags", "tiles", "args"] {
+                    assert_eq!(full.0[list], reading.0[list], "{name}: {list}");
+                }
+                for (a, b) in full.output().into_iter().zip(reading.output()) {
+                    let apart = (a[0] - b[0]).abs();
+                    assert!(apart <= 0.01 * a[0], "{name}: {a:?} and {b:?}");
+                }
+            }
+        }
+        // The comparison notices a G-buffer that is another frame's.
+        let off = READ_INSTEAD[2].1;
+        let mut other = case.clone();
+        other.steps[4].images.pixels.iter_mut().for_each(|pixel| pixel.depth *= 2.0);
+        let (a, b) = (run(&case, executor, &[off]), run(&other, executor, &[off]));
+        let differs = a[5].output().into_iter().zip(b[5].output()).any(|(a, b)| (a[0] - b[0]).abs() > 0.01 * a[0]);
+        assert!(differs);
+    }
+}
+
 #[test]
 fn what_a_scene_does_not_use_changes_nothing_over_footprints() {
     let executor = &mut *fastest();

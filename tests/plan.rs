@@ -154,6 +154,42 @@ fn memory_stays_within_the_published_figure() {
     assert_eq!(memory.total(), plan.resources.iter().map(|r| r.bytes(SIZE)).sum::<u64>());
 }
 
+/// What was denoised in the last frame is read from its G-buffer: by other rules it would be something else.
+#[test]
+fn history_is_lost_where_last_frames_gbuffer_would_say_otherwise() {
+    let projection = rh::proj::directx::perspective(1.0, 1.5, 0.1, 100.0);
+    let camera = Camera { world_to_view: Mat4::IDENTITY, view_to_clip: projection, jitter: Vec2::ZERO };
+    let frame = FrameInputs::new(camera, UVec2::new(640, 480));
+    for gbuffer_copy in [true, false] {
+        let mut settings = Settings::default();
+        settings.features.gbuffer_copy = gbuffer_copy;
+        let mut denoiser = Denoiser::new(&settings, SIZE).unwrap();
+        let run = |denoiser: &mut Denoiser| {
+            let expected = denoiser.prev_size(&frame);
+            let constants = denoiser.next_frame(&frame).unwrap().constants;
+            assert_eq!(UVec2::from_array(constants.prev_size), expected);
+            expected
+        };
+        assert_eq!(run(&mut denoiser), UVec2::ZERO);
+        // Not finished: none to follow.
+        assert_eq!(run(&mut denoiser), UVec2::ZERO);
+        // Between the stages of a frame, which goes on as it was begun.
+        settings.coverage.roughness_threshold = 0.5;
+        assert!(!denoiser.set_settings(&settings).unwrap());
+        assert!(denoiser.started_frame().is_ok());
+        denoiser.finish_frame();
+        assert_eq!(run(&mut denoiser), if gbuffer_copy { frame.size } else { UVec2::ZERO });
+        denoiser.finish_frame();
+        settings.accumulate.clip_scale = 2.0;
+        assert!(!denoiser.set_settings(&settings).unwrap());
+        assert_eq!(run(&mut denoiser), frame.size);
+        denoiser.finish_frame();
+        let mut cut = frame.clone();
+        cut.reset = true;
+        assert_eq!(denoiser.prev_size(&cut), UVec2::ZERO);
+    }
+}
+
 #[test]
 fn every_hazard_has_a_barrier() {
     let mut settings = Preset::Reference.settings();
