@@ -147,7 +147,7 @@ fn load_prev_guide(texel: vec2<i32>) -> Guide {
     if GBUFFER_IS_COPIED {
         return unpack_prev_guide(textureLoad(in_prev_guide, texel, 0).x);
     }
-    return decoded_prev_guide(texel);
+    return decode_prev_guide(texel);
 }
 
 // Blends those of four texels that show the surface. The plane test is done in world space, so that a camera that

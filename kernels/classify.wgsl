@@ -95,7 +95,7 @@ fn classify(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_i
     var flags = 0u;
     workgroupBarrier();
     if on_screen {
-        let guide = decoded_guide(pixel);
+        let guide = decode_guide(pixel, depth_encoding());
         if GUIDE_IS_PACKED {
             textureStore(out_guide, pixel, vec4<u32>(pack_guide(guide), 0u, 0u));
         }

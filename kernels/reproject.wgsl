@@ -76,7 +76,7 @@ fn load_prev_guide(texel: vec2<i32>) -> Guide {
     if GBUFFER_IS_COPIED {
         return unpack_guide(textureLoad(in_prev_guide, texel, 0).xy);
     }
-    return decoded_prev_guide(texel);
+    return decode_prev_guide(texel);
 }
 
 // Surface of last frame around a place. Inverse depth is blended, being linear on screen.

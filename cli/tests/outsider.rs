@@ -55,6 +55,7 @@ fn runs() -> Vec<Run> {
     let mut few = Settings::default();
     (few.features.spatial_filter, few.features.light_change) = (false, false);
     few.features.constant_roughness = Some(0.25);
+    (few.features.gbuffer_copy, few.features.packed_guide) = (false, false);
     let few = case(&few, "mirrors", &[SIZE; 3]);
     vec![
         Run { name: "default", options: &[], case: default },

@@ -39,15 +39,22 @@ fn decode_normal(texel: vec4<f32>) -> vec3<f32> {
     return oct_decode(texel.xy * 2.0 - 1.0);
 }
 
-fn decode_depth(device: f32, c: vec4<f32>) -> f32 {
+// How the depths that the caller supplies become linear.
+struct DepthEncoding {
+    from_device: vec4<f32>,
+    sky: vec2<f32>,
+}
+
+fn linear_depth(device: f32, encoding: DepthEncoding) -> f32 {
+    let c = encoding.from_device;
     let depth = abs((c.x + c.y * device) / (c.z + c.w * device));
-    let is_surface = is_finite(device) && device > frame.sky_depth.x && device < frame.sky_depth.y
+    let is_surface = is_finite(device) && device > encoding.sky.x && device < encoding.sky.y
         && is_finite(depth) && depth > 0.0 && depth < SKY_DEPTH;
     return select(SKY_DEPTH, depth, is_surface);
 }
 
 // Texels that hold no direction or no roughness make their pixel one without a surface.
-fn decode_guide(normal_texel: vec4<f32>, stored_roughness: f32, depth: f32) -> Guide {
+fn guide_of(normal_texel: vec4<f32>, stored_roughness: f32, depth: f32) -> Guide {
     let normal = decode_normal(normal_texel);
     let squared_length = dot(normal, normal);
     let usable = is_finite(squared_length) && squared_length > 1e-12 && is_finite(stored_roughness);
@@ -63,24 +70,32 @@ fn decode_guide(normal_texel: vec4<f32>, stored_roughness: f32, depth: f32) -> G
     return guide;
 }
 
+fn depth_encoding() -> DepthEncoding {
+    return DepthEncoding(frame.depth_from_device, frame.sky_depth);
+}
+
+fn decode_depth(pixel: vec2<u32>, encoding: DepthEncoding) -> f32 {
+    return linear_depth(textureLoad(in_depth, pixel, 0).x, encoding);
+}
+
 // This frame's, from the caller's images.
-fn decoded_guide(pixel: vec2<u32>) -> Guide {
+fn decode_guide(pixel: vec2<u32>, encoding: DepthEncoding) -> Guide {
     var roughness = frame.constant_roughness;
     if !ROUGHNESS_IS_CONSTANT {
         roughness = textureLoad(in_roughness, pixel, 0)[ROUGHNESS_CHANNEL];
     }
-    let depth = decode_depth(textureLoad(in_depth, pixel, 0).x, frame.depth_from_device);
-    return decode_guide(textureLoad(in_normal, pixel, 0), roughness, depth);
+    return guide_of(textureLoad(in_normal, pixel, 0), roughness, decode_depth(pixel, encoding));
 }
 
 // Last frame's, from the caller's images.
-fn decoded_prev_guide(texel: vec2<i32>) -> Guide {
+fn decode_prev_guide(texel: vec2<i32>) -> Guide {
     var roughness = frame.constant_roughness;
     if !ROUGHNESS_IS_CONSTANT {
         roughness = textureLoad(in_prev_roughness, texel, 0)[ROUGHNESS_CHANNEL];
     }
-    let depth = decode_depth(textureLoad(in_prev_depth, texel, 0).x, frame.prev_depth_from_device);
-    return decode_guide(textureLoad(in_prev_normal, texel, 0), roughness, depth);
+    let encoding = DepthEncoding(frame.prev_depth_from_device, frame.sky_depth);
+    let depth = linear_depth(textureLoad(in_prev_depth, texel, 0).x, encoding);
+    return guide_of(textureLoad(in_prev_normal, texel, 0), roughness, depth);
 }
 
 // This frame's, from wherever it is.
@@ -88,7 +103,7 @@ fn load_guide(pixel: vec2<u32>) -> Guide {
     if GUIDE_IS_PACKED {
         return unpack_guide(textureLoad(in_guide, pixel, 0).xy);
     }
-    return decoded_guide(pixel);
+    return decode_guide(pixel, depth_encoding());
 }
 
 // Whether this frame's pixel is denoised.
@@ -96,5 +111,5 @@ fn is_denoised(pixel: vec2<u32>) -> bool {
     if GUIDE_IS_PACKED {
         return packed_guide_is_denoised(textureLoad(in_guide, pixel, 0).xy);
     }
-    return decoded_guide(pixel).denoised;
+    return decode_guide(pixel, depth_encoding()).denoised;
 }
