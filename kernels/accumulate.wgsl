@@ -6,7 +6,7 @@
 //! in   guide         rg32uint     full    this frame's packed G-buffer, or normal, roughness, depth
 //! in   prev_guide    r32uint      full    last frame's, in fewer bits, or its normal, roughness, depth
 //! in   history       rgba16float  full    last frame's `history`
-//! in   blocks        rgba32uint   block   of the input: statistics, excess of outliers over the footprint (block statistics)
+//! in   blocks        rgba32uint   block   of the input: statistics, outliers' excess spread (block statistics)
 //! in   samples       rg32uint     block   largest luminances (outlier spread)
 //! in   light         r32uint      block   whether the light changed (light change)
 //! in   tiles, args   lists                tiles to denoise
