@@ -3,10 +3,10 @@
 //!
 //! in   radiance      any float    full    noisy input; a: hit distance
 //! in   motion        any float    full    uv motion of the surface (surface motion)
-//! in   guide         rg32uint     full    this frame's packed G-buffer
-//! in   prev_guide    r32uint      full    last frame's, in fewer bits
+//! in   guide         rg32uint     full    this frame's packed G-buffer, or normal, roughness, depth
+//! in   prev_guide    r32uint      full    last frame's, in fewer bits, or its normal, roughness, depth
 //! in   history       rgba16float  full    last frame's `history`
-//! in   blocks        rgba32uint   block   statistics of the input, excess of outliers spread over the footprint
+//! in   blocks        rgba32uint   block   of the input: statistics, outliers' excess spread (block statistics)
 //! in   samples       rg32uint     block   largest luminances (outlier spread)
 //! in   light         r32uint      block   whether the light changed (light change)
 //! in   tiles, args   lists                tiles to denoise
@@ -19,6 +19,7 @@
 
 import package::shared::frame;
 import package::shared::packing;
+import package::shared::gbuffer;
 import package::shared::radiance;
 import package::shared::outliers;
 import package::shared::tiles;
@@ -36,10 +37,11 @@ override HISTORY_CLIP: bool = true;
 override LIGHT_CHANGE: bool = true;
 // Cuts outliers off and adds what was cut off, spread.
 override OUTLIER_SPREAD: bool = true;
+// There are blocks of this frame's input to compare with.
+override BLOCK_STATISTICS: bool = true;
 
 @group(0) @binding(5) var in_motion: texture_2d<f32>;
 
-@group(1) @binding(0) var in_guide: texture_2d<u32>;
 @group(1) @binding(1) var in_prev_guide: texture_2d<u32>;
 @group(1) @binding(2) var in_history: texture_2d<f32>;
 @group(1) @binding(3) var in_blocks: texture_2d<u32>;
@@ -63,6 +65,9 @@ const RARE: f32 = 2.0;
 // lamps in mirrors have edges, and the deviation across an edge bounds nothing.
 const MIRROR_WEIGHT: f32 = 20.0;
 const MIRROR_UP_TO: f32 = 0.03;
+
+// Deviation that a sample counts as having of which no block says one.
+const ALONE_DEVIATION: f32 = 0.1;
 
 // What the blocks around a pixel say about its surface.
 struct Surroundings {
@@ -138,6 +143,13 @@ struct Tolerance {
     share: f32,
 }
 
+fn load_prev_guide(texel: vec2<i32>) -> Guide {
+    if GBUFFER_IS_COPIED {
+        return unpack_prev_guide(textureLoad(in_prev_guide, texel, 0).x);
+    }
+    return decode_prev_guide(texel);
+}
+
 // Blends those of four texels that show the surface. The plane test is done in world space, so that a camera that
 // moves forward does not fail it.
 fn history_at(prev_uv: vec2<f32>, guide: Guide, position: vec3<f32>, share: f32, tolerance: Tolerance) -> Found {
@@ -156,7 +168,7 @@ fn history_at(prev_uv: vec2<f32>, guide: Guide, position: vec3<f32>, share: f32,
     for (var i = 0u; i < 4u; i++) {
         let offset = vec2<u32>(i & 1u, i >> 1u);
         let texel = clamp(vec2<i32>(base) + vec2<i32>(offset), vec2<i32>(0), last);
-        let tap = unpack_prev_guide(textureLoad(in_prev_guide, texel, 0).x);
+        let tap = load_prev_guide(texel);
         let history = unpack_history(textureLoad(in_history, texel, 0));
         let from_plane = dot(guide.normal, prev_world_position(texel, tap.depth) - position);
         let is_same = tap.denoised
@@ -229,9 +241,19 @@ struct Subject {
     share: f32,
 }
 
+// What a pixel knows of its surroundings by itself: the sample, and nothing about hit distances.
+fn alone(pixel: vec2<u32>) -> Surroundings {
+    return Surroundings(load_radiance(pixel), 0.5, vec3<f32>(0.0), ALONE_DEVIATION, 0.0);
+}
+
 fn subject_of(pixel: vec2<u32>, guide: Guide) -> Subject {
     let position = world_position(pixel, guide.depth);
-    let around = surroundings_of(pixel, plane_of(guide, position));
+    var around: Surroundings;
+    if BLOCK_STATISTICS {
+        around = surroundings_of(pixel, plane_of(guide, position));
+    } else {
+        around = alone(pixel);
+    }
     let distance = usable_hit_distance(textureLoad(in_radiance, pixel, 0).a);
     let own_share = select(around.share, hit_share(distance, camera_distance_of(position)), distance > 0.0);
     // Single hit distances of rough surfaces say little, and go with the colour of their sample.
@@ -341,7 +363,7 @@ fn accumulate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
     if any(pixel >= frame.size) {
         return;
     }
-    let guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
+    let guide = load_guide(pixel);
     var history = History(vec3<f32>(0.0), 0.0, 0.0, -1.0);
     if guide.denoised {
         history = accumulated(pixel, guide);

@@ -1,6 +1,6 @@
 //! Block average: averages radiance over the part of each 4x4 block that shows one surface.
 //!
-//! in   guide      rg32uint      full    packed G-buffer
+//! in   guide      rg32uint      full    packed G-buffer, or normal, roughness, depth
 //! in   radiance   any float     full    noisy input; a: hit distance (not when ACCUMULATED)
 //! in   history    rgba16float   full    this frame's accumulated radiance (when ACCUMULATED)
 //! in   tiles, args   lists             tiles to denoise
@@ -14,6 +14,7 @@
 
 import package::shared::frame;
 import package::shared::packing;
+import package::shared::gbuffer;
 import package::shared::radiance;
 import package::shared::outliers;
 import package::shared::footprint;
@@ -28,7 +29,6 @@ override OUTLIER_SPREAD: bool = true;
 // Some later pass uses `samples`.
 override SAMPLES_ARE_USED: bool = false;
 
-@group(1) @binding(0) var in_guide: texture_2d<u32>;
 @group(1) @binding(1) var in_history: texture_2d<f32>;
 @group(1) @binding(2) var out_blocks: texture_storage_2d<rgba32uint, write>;
 @group(1) @binding(3) var out_samples: texture_storage_2d<rg32uint, write>;
@@ -56,7 +56,7 @@ fn choose(corner: vec2<u32>) -> Choice {
     let size = pixel_count(corner);
     for (var i = 0u; i < size.x * size.y; i++) {
         let pixel = corner + vec2<u32>(i % size.x, i / size.x);
-        let guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
+        let guide = load_guide(pixel);
         // A little off the centre, so that no two are as near.
         let offset = vec2<f32>(pixel - corner) - vec2<f32>(1.4, 1.45);
         let distance = dot(offset, offset);
@@ -105,7 +105,7 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
     let size = pixel_count(corner);
     for (var i = 0u; i < size.x * size.y; i++) {
         let pixel = corner + vec2<u32>(i % size.x, i / size.x);
-        let guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
+        let guide = load_guide(pixel);
         let w = select(0.0, exp(-plane_penalty(plane, guide, vec2<f32>(pixel) + 0.5)), guide.denoised);
         var c = vec3<f32>(0.0);
         if ACCUMULATED {

@@ -3,7 +3,7 @@
 //!
 //! in   normal, roughness, depth   as the caller has them     full
 //! in   history      rgba16float   full   a: last frame's variance (ray list only)
-//! out  guide        rg32uint      full   packed normal, linear depth, roughness, left-out flag
+//! out  guide        rg32uint      full   packed normal, linear depth, roughness, left-out flag (packed guide)
 //! out  tile_flags   r32uint       tile   whether a pixel of the tile is denoised
 //! out  rays         u32 list      pixels to trace and where to copy the result (ray list only)
 //! out  counters     4 x u32       rays (ray list only)
@@ -14,24 +14,13 @@
 
 import package::shared::frame;
 import package::shared::packing;
+import package::shared::gbuffer;
 import package::shared::tiles;
 
-// 0: xyz in -1..1, 1: xyz in 0..1, 2: octahedral in -1..1, 3: octahedral in 0..1.
-override NORMAL_ENCODING: u32 = 0u;
-// Channel of the roughness texture.
-override ROUGHNESS_CHANNEL: u32 = 0u;
-// The roughness texture holds GGX alpha, not perceptual roughness.
-override ROUGHNESS_IS_ALPHA: bool = false;
-// All surfaces have the roughness in the constants; there is no texture of it.
-override ROUGHNESS_IS_CONSTANT: bool = false;
 // Rays in a 2x2 quad: 1, 2 or 4; 0: no ray list.
 override RAYS_PER_QUAD: u32 = 0u;
 // Pixels whose variance was high last frame get their own ray.
 override RAYS_FOLLOW_VARIANCE: bool = false;
-
-@group(0) @binding(2) var in_normal: texture_2d<f32>;
-@group(0) @binding(3) var in_roughness: texture_2d<f32>;
-@group(0) @binding(4) var in_depth: texture_2d<f32>;
 
 @group(1) @binding(0) var in_history: texture_2d<f32>;
 @group(1) @binding(1) var out_guide: texture_storage_2d<rg32uint, write>;
@@ -46,49 +35,6 @@ var<workgroup> tile_is_listed: atomic<u32>;
 var<workgroup> tile_ray_count: atomic<u32>;
 var<workgroup> tile_first_ray: u32;
 var<workgroup> pixel_flags: array<u32, 64>;
-
-fn decode_normal(texel: vec4<f32>) -> vec3<f32> {
-    if NORMAL_ENCODING == 0u {
-        return texel.xyz;
-    }
-    if NORMAL_ENCODING == 1u {
-        return texel.xyz * 2.0 - 1.0;
-    }
-    if NORMAL_ENCODING == 2u {
-        return oct_decode(texel.xy);
-    }
-    return oct_decode(texel.xy * 2.0 - 1.0);
-}
-
-fn decode_depth(pixel: vec2<u32>) -> f32 {
-    let device = textureLoad(in_depth, pixel, 0).x;
-    let c = frame.depth_from_device;
-    let depth = abs((c.x + c.y * device) / (c.z + c.w * device));
-    let is_surface = is_finite(device) && device > frame.sky_depth.x && device < frame.sky_depth.y
-        && is_finite(depth) && depth > 0.0 && depth < SKY_DEPTH;
-    return select(SKY_DEPTH, depth, is_surface);
-}
-
-// Texels that hold no direction or no roughness make their pixel one without a surface.
-fn decode_guide(pixel: vec2<u32>) -> Guide {
-    let normal = decode_normal(textureLoad(in_normal, pixel, 0));
-    var stored_roughness = frame.constant_roughness;
-    if !ROUGHNESS_IS_CONSTANT {
-        stored_roughness = textureLoad(in_roughness, pixel, 0)[ROUGHNESS_CHANNEL];
-    }
-    let squared_length = dot(normal, normal);
-    let usable = is_finite(squared_length) && squared_length > 1e-12 && is_finite(stored_roughness);
-    var guide: Guide;
-    guide.normal = select(vec3<f32>(0.0, 0.0, 1.0), normal * inverseSqrt(max(squared_length, 1e-12)), usable);
-    guide.roughness = select(1.0, saturate(stored_roughness), is_finite(stored_roughness));
-    if ROUGHNESS_IS_ALPHA {
-        guide.roughness = sqrt(guide.roughness);
-    }
-    guide.roughness = quantized_roughness(guide.roughness);
-    guide.depth = select(SKY_DEPTH, decode_depth(pixel), usable);
-    guide.denoised = guide.depth < SKY_DEPTH && guide.roughness <= frame.roughness_threshold;
-    return guide;
-}
 
 // Whether the sampling pattern gives the pixel a ray of its own.
 fn prefers_ray(pixel: vec2<u32>, guide: Guide) -> bool {
@@ -149,8 +95,10 @@ fn classify(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_i
     var flags = 0u;
     workgroupBarrier();
     if on_screen {
-        let guide = decode_guide(pixel);
-        textureStore(out_guide, pixel, vec4<u32>(pack_guide(guide), 0u, 0u));
+        let guide = decode_guide(pixel, depth_encoding());
+        if GUIDE_IS_PACKED {
+            textureStore(out_guide, pixel, vec4<u32>(pack_guide(guide), 0u, 0u));
+        }
         if guide.denoised {
             atomicStore(&tile_is_listed, 1u);
             flags = PIXEL_DENOISED;

@@ -1,6 +1,6 @@
 //! Debug view: shows in colours what the footprint pipeline finds out about each pixel.
 //!
-//! in   guide          rg32uint      full    packed G-buffer
+//! in   guide          rg32uint      full    packed G-buffer, or normal, roughness, depth
 //! in   accumulated    rgba16float   full    this frame's `history` (history length, variance)
 //! in   radiance       any float     full    hit distance; all that `accumulate` reads (disocclusion, candidate)
 //! in   blocks         rgba32uint    block   as `accumulate` reads them (average)
@@ -71,7 +71,7 @@ fn debug_view(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
     let on_screen = all(pixel < frame.size);
     var guide: Guide;
     if on_screen {
-        guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
+        guide = load_guide(pixel);
     }
     if VIEW == TILE_CLASSES {
         gather_tile(lane, guide);

@@ -1,6 +1,6 @@
 //! Debug view: shows in colours what the published pipeline finds out about each pixel.
 //!
-//! in   guide          rg32uint      full   packed G-buffer
+//! in   guide          rg32uint      full   packed G-buffer, or normal, roughness, depth
 //! in   reprojected    rg32uint      full   what `reproject` wrote (history length, variance)
 //! in   radiance       any float     full   hit distance; all that `reproject` reads (disocclusion, candidate)
 //! in   average        rgba16float   tile   (average)
@@ -88,7 +88,7 @@ fn gather_neighborhood(tile: vec2<u32>, lane: u32) {
         var radiance = vec3<f32>(0.0);
         var counts = false;
         if all(p >= vec2<i32>(0)) && all(p < vec2<i32>(frame.size)) {
-            counts = packed_guide_is_denoised(textureLoad(in_guide, p, 0).xy);
+            counts = is_denoised(vec2<u32>(p));
             radiance = load_radiance(vec2<u32>(p));
         }
         store_window(entry, radiance, counts);
@@ -104,7 +104,7 @@ fn debug_view_published(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_
     let on_screen = all(pixel < frame.size);
     var guide: Guide;
     if on_screen {
-        guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
+        guide = load_guide(pixel);
     }
     if VIEW == TILE_CLASSES {
         gather_tile(lane, guide);

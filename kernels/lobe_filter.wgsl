@@ -2,12 +2,12 @@
 //! the footprint is wide, a few pixels where it is narrow, and for mirrors those that differ by noise alone.
 //!
 //! in   history       rgba16float   full    this frame's accumulated radiance
-//! in   guide         rg32uint      full    packed G-buffer
+//! in   guide         rg32uint      full    packed G-buffer, or normal, roughness, depth
 //! in   blocks        rgba32uint    block   accumulated radiance filtered over the footprint, its deviation
 //! in   tiles, args   lists                 tiles to denoise
 //! in   radiance      any float     full    input fallback
 //! out  output        rgba16float   full    rgb: denoised radiance; a: variance of its brightness, 0..1
-//! out  prev_guide    r32uint       full    what the next frame wants to know of the G-buffer
+//! out  prev_guide    r32uint       full    what the next frame wants to know of the G-buffer (G-buffer copy)
 //!
 //! Grid: one 8x8 workgroup per listed tile (indirect). Loads 4 blocks, and a history and a guide for each near tap.
 //! Weights depend on the surface, on hit distance and on how settled a tap is; on colour for mirrors only: elsewhere
@@ -15,6 +15,7 @@
 
 import package::shared::frame;
 import package::shared::packing;
+import package::shared::gbuffer;
 import package::shared::radiance;
 import package::shared::tiles;
 import package::shared::footprint;
@@ -28,7 +29,6 @@ override NEAR_TAPS: u32 = 12u;
 // There are filtered blocks.
 override WIDE_FILTER: bool = true;
 
-@group(1) @binding(1) var in_guide: texture_2d<u32>;
 @group(1) @binding(2) var in_history: texture_2d<f32>;
 @group(1) @binding(3) var in_blocks: texture_2d<u32>;
 @group(1) @binding(4) var<storage, read> in_tiles: array<u32>;
@@ -121,7 +121,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
         let offset = round(footprint.axis * point.x + side * point.y);
         let at = vec2<i32>(pixel) + vec2<i32>(offset);
         let texel = clamp(at, vec2<i32>(0), vec2<i32>(frame.size) - 1);
-        let tap = unpack_guide(textureLoad(in_guide, texel, 0).xy);
+        let tap = load_guide(vec2<u32>(texel));
         let history = unpack_history(textureLoad(in_history, texel, 0));
         let radiance = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
         let l = luminance(radiance);
@@ -154,7 +154,7 @@ fn lobe_filter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     if any(pixel >= frame.size) {
         return;
     }
-    let guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
+    let guide = load_guide(pixel);
     var result: vec4<f32>;
     if guide.denoised {
         result = filtered(pixel, guide);
@@ -163,5 +163,7 @@ fn lobe_filter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
         result = vec4<f32>(fallback_radiance(pixel, guide), 0.0);
     }
     textureStore(out_output, pixel, rounded_to_half(result));
-    textureStore(out_prev_guide, pixel, vec4<u32>(pack_prev_guide(guide), 0u, 0u, 0u));
+    if GBUFFER_IS_COPIED {
+        textureStore(out_prev_guide, pixel, vec4<u32>(pack_prev_guide(guide), 0u, 0u, 0u));
+    }
 }

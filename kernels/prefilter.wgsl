@@ -1,7 +1,7 @@
 //! Prefilter: one sparse edge-stopping blur of the noisy input, stronger where it varies over time.
 //!
 //! in   radiance       any float     full   noisy input
-//! in   guide          rg32uint      full   packed G-buffer
+//! in   guide          rg32uint      full   packed G-buffer, or normal, roughness, depth
 //! in   reprojected    rg32uint      full   for the variance
 //! in   average        rgba16float   tile
 //! in   tiles, args    lists         tiles to denoise
@@ -13,11 +13,11 @@
 
 import package::shared::frame;
 import package::shared::packing;
+import package::shared::gbuffer;
 import package::shared::radiance;
 import package::shared::tiles;
 import package::shared::average;
 
-@group(1) @binding(1) var in_guide: texture_2d<u32>;
 @group(1) @binding(2) var in_reprojected: texture_2d<u32>;
 @group(1) @binding(3) var<storage, read> in_tiles: array<u32>;
 @group(1) @binding(4) var<storage, read> in_args: array<vec4<u32>, 4>;
@@ -45,7 +45,7 @@ fn load_window(tile: vec2<u32>, entry: u32) {
     let p = vec2<i32>(tile * TILE_SIZE + offset) - vec2<i32>(i32(WINDOW_BORDER));
     var depth = 0.0;
     if all(p >= vec2<i32>(0)) && all(p < vec2<i32>(frame.size)) {
-        let guide = unpack_guide(textureLoad(in_guide, p, 0).xy);
+        let guide = load_guide(vec2<u32>(p));
         if guide.denoised {
             depth = guide.depth;
             let variance = unpack_reprojected(textureLoad(in_reprojected, p, 0).xy).variance;
@@ -124,7 +124,7 @@ fn prefilter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
         return;
     }
     var signal = unpack_radiance(window_radiance[center]);
-    let roughness = unpack_guide(textureLoad(in_guide, pixel, 0).xy).roughness;
+    let roughness = load_guide(pixel).roughness;
     if signal.a > 0.0 && roughness > frame.mirror_roughness {
         signal = prefilter_at(center, sample_average(pixel));
     }

@@ -3,8 +3,8 @@
 //!
 //! in   radiance       any float     full   noisy input; a: hit distance
 //! in   motion         any float     full   uv motion of the surface
-//! in   guide          rg32uint      full   this frame's packed G-buffer
-//! in   prev_guide     rg32uint      full   last frame's
+//! in   guide          rg32uint      full   this frame's packed G-buffer, or normal, roughness, depth
+//! in   prev_guide     rg32uint      full   last frame's, or its normal, roughness, depth
 //! in   history        rgba16float   full   last frame's output; a: variance
 //! in   prev_signal    rg32uint      full   last frame's `reprojected`, for the history length
 //! in   tiles, args    lists         tiles to denoise
@@ -18,6 +18,7 @@
 
 import package::shared::frame;
 import package::shared::packing;
+import package::shared::gbuffer;
 import package::shared::radiance;
 import package::shared::tiles;
 import package::shared::neighborhood;
@@ -35,7 +36,6 @@ override AVERAGE_IS_USED: bool = true;
 
 @group(0) @binding(5) var in_motion: texture_2d<f32>;
 
-@group(1) @binding(0) var in_guide: texture_2d<u32>;
 @group(1) @binding(1) var in_prev_guide: texture_2d<u32>;
 @group(1) @binding(2) var in_history: texture_2d<f32>;
 @group(1) @binding(3) var in_prev_signal: texture_2d<u32>;
@@ -72,6 +72,13 @@ fn is_on_prev_screen(prev_uv: vec2<f32>) -> bool {
     return all(position > vec2<f32>(0.0)) && all(position < size);
 }
 
+fn load_prev_guide(texel: vec2<i32>) -> Guide {
+    if GBUFFER_IS_COPIED {
+        return unpack_guide(textureLoad(in_prev_guide, texel, 0).xy);
+    }
+    return decode_prev_guide(texel);
+}
+
 // Surface of last frame around a place. Inverse depth is blended, being linear on screen.
 struct PrevSurface {
     normal: vec3<f32>,
@@ -88,7 +95,7 @@ fn prev_surface_at(prev_uv: vec2<f32>) -> PrevSurface {
     var inverse_depth = 0.0;
     var alpha = 0.0;
     for (var i = 0u; i < 4u; i++) {
-        let tap = unpack_guide(textureLoad(in_prev_guide, footprint_texel(footprint, i), 0).xy);
+        let tap = load_prev_guide(footprint_texel(footprint, i));
         let w = footprint.weights[i];
         // The sky has no normal.
         normal += select(w, 0.0, tap.depth >= SKY_DEPTH) * tap.normal;
@@ -235,7 +242,7 @@ fn repair_edge(guide: Guide, found: Match) -> Match {
     var normal = vec3<f32>(0.0);
     var depth = 0.0;
     for (var i = 0u; i < 4u; i++) {
-        let tap = unpack_guide(textureLoad(in_prev_guide, footprint_texel(footprint, i), 0).xy);
+        let tap = load_prev_guide(footprint_texel(footprint, i));
         let factor = disocclusion_factor(guide, tap.normal, tap.depth);
         if factor > frame.disocclusion_threshold * frame.disocclusion_tap_fraction {
             let w = footprint.weights[i];
@@ -293,7 +300,7 @@ fn reproject(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
             var radiance = vec3<f32>(0.0);
             var counts = false;
             if all(p >= vec2<i32>(0)) && all(p < vec2<i32>(frame.size)) {
-                counts = packed_guide_is_denoised(textureLoad(in_guide, p, 0).xy);
+                counts = is_denoised(vec2<u32>(p));
                 radiance = load_radiance(vec2<u32>(p));
             }
             store_window(entry, radiance, counts);
@@ -306,7 +313,7 @@ fn reproject(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     // rgb: weighted radiance, a: weight in the average of the tile.
     var contribution = vec4<f32>(0.0);
     if all(pixel < frame.size) {
-        let guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
+        let guide = load_guide(pixel);
         var reprojected = Reprojected(vec3<f32>(0.0), 0.0, 0.0);
         if guide.denoised {
             var radiance = load_radiance(pixel);

@@ -2,7 +2,7 @@
 //!
 //! in   prefiltered    rg32uint      full   packed radiance and variance (with the spatial filter)
 //! in   reprojected    rg32uint      full   packed history radiance and length
-//! in   guide          rg32uint      full   left-out flag (and surface, for the environment fallback)
+//! in   guide          rg32uint      full   packed G-buffer, or normal, roughness, depth: what is left out
 //! in   average        rgba16float   tile   (history clip or average mixing)
 //! in   tiles, args    lists         tiles to denoise
 //! in   radiance       any float     full   input fallback, or no spatial filter
@@ -14,6 +14,7 @@
 
 import package::shared::frame;
 import package::shared::packing;
+import package::shared::gbuffer;
 import package::shared::radiance;
 import package::shared::tiles;
 import package::shared::neighborhood;
@@ -29,7 +30,6 @@ override AVERAGE_MIXING: bool = true;
 // One of these two.
 override AVERAGE_IS_READ: bool = true;
 
-@group(1) @binding(1) var in_guide: texture_2d<u32>;
 @group(1) @binding(2) var in_reprojected: texture_2d<u32>;
 @group(1) @binding(3) var in_prefiltered: texture_2d<u32>;
 @group(1) @binding(4) var<storage, read> in_tiles: array<u32>;
@@ -94,7 +94,7 @@ fn resolve_temporal(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invo
             var radiance = vec3<f32>(0.0);
             var counts = false;
             if all(p >= vec2<i32>(0)) && all(p < vec2<i32>(frame.size)) {
-                counts = packed_guide_is_denoised(textureLoad(in_guide, p, 0).xy);
+                counts = is_denoised(vec2<u32>(p));
                 if SPATIAL_FILTER {
                     radiance = unpack_radiance(textureLoad(in_prefiltered, p, 0).xy).rgb;
                 } else {
@@ -111,7 +111,7 @@ fn resolve_temporal(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invo
     if any(pixel >= frame.size) {
         return;
     }
-    let guide = unpack_guide(textureLoad(in_guide, pixel, 0).xy);
+    let guide = load_guide(pixel);
     var result: vec4<f32>;
     if guide.denoised {
         result = resolve(pixel, lane);

@@ -51,6 +51,13 @@ pub enum Change {
     Plan,
 }
 
+/// Whether last frame's G-buffer would say otherwise than it did then what was denoised.
+fn reads_otherwise(settings: &Settings, last: &Settings) -> bool {
+    settings.coverage.roughness_threshold != last.coverage.roughness_threshold
+        || settings.features.constant_roughness != last.features.constant_roughness
+        || settings.conventions != last.conventions
+}
+
 /// Decides passes, resources and constants. Backends own one and carry out what it says.
 #[derive(Debug, Clone)]
 pub struct Denoiser {
@@ -99,7 +106,7 @@ impl Denoiser {
     }
 
     /// Changes settings. What was made for settings that were in force or [prepared](Self::prepare) before is used
-    /// again.
+    /// again. Where the caller supplies last frame's G-buffer, a change of what it says is denoised loses history too.
     ///
     /// # Errors
     ///
@@ -113,12 +120,16 @@ impl Denoiser {
             false if counts_alike && plan.is_like(&self.plan) => Change::Kernels,
             _ => Change::Plan,
         };
+        let rereads = !settings.features.gbuffer_copy && reads_otherwise(settings, &self.settings);
         self.settings = settings.clone();
         if change != Change::Constants {
             (self.plan, self.kernels) = (plan, kernels);
         }
         if change == Change::Plan {
             self.forget();
+        }
+        if rereads {
+            self.previous = None;
         }
         Ok(change)
     }
@@ -152,6 +163,16 @@ impl Denoiser {
         Ok(())
     }
 
+    /// Size of the frame that `inputs` finds history of; zero where there is none. What the caller supplies of last
+    /// frame has to be as large; see [`input_size`](crate::resource::input_size).
+    pub fn prev_size(&self, inputs: &FrameInputs) -> UVec2 {
+        self.last_finished().filter(|_| !inputs.reset).map_or(UVec2::ZERO, |previous| previous.size)
+    }
+
+    fn last_finished(&self) -> Option<Previous> {
+        if self.started.is_some() { None } else { self.previous }
+    }
+
     fn forget(&mut self) {
         (self.previous, self.started) = (None, None);
     }
@@ -164,8 +185,7 @@ impl Denoiser {
     ///
     /// [`Error::Size`], [`Error::Camera`] or [`Error::FrameInput`]; the denoiser is as before then.
     pub fn next_frame(&mut self, inputs: &FrameInputs) -> Result<FrameSchedule, Error> {
-        let previous = if self.started.is_some() { None } else { self.previous };
-        let constants = frame::constants(&self.settings, inputs, self.plan.size, previous)?;
+        let constants = frame::constants(&self.settings, inputs, self.plan.size, self.last_finished())?;
         let phase = (self.frame_index % 2) as usize;
         self.frame_index = self.frame_index.wrapping_add(1);
         self.previous = Some(Previous { camera: inputs.camera, size: inputs.size });

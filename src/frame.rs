@@ -37,7 +37,8 @@ pub struct FrameInputs {
     pub exposure: f32,
     /// Time since the frame before, in seconds. Above 0. Settings in seconds are counted in frames of this length.
     pub frame_seconds: f32,
-    /// Camera of the preceding frame, where it is not the one that was denoised last (frames were skipped).
+    /// Camera of the preceding frame, where it is not the one that was denoised last (frames were skipped). A G-buffer of
+    /// last frame that the caller supplies is of this camera.
     pub previous_camera: Option<Camera>,
 }
 
@@ -75,6 +76,7 @@ constants! {
         world_from_prev_pixel: [[f32; 4]; 4],
         environment_from_world: [[f32; 4]; 4],
         depth_from_device: [f32; 4],
+        prev_depth_from_device: [f32; 4],
         neighborhood_weights: [f32; 4],
         forward: [f32; 4],
         clip_w: [f32; 2],
@@ -202,6 +204,15 @@ fn pixel_to_view(camera: &Camera, size: DVec2, ndc_y: f64, sign: f64) -> (DMat4,
     (matrix, clip_w)
 }
 
+/// Linear depth of a depth `d` as it is supplied: `|(x + y d) / (z + w d)|`.
+fn depth_from_device(encoding: DepthEncoding, camera: &Camera) -> [f32; 4] {
+    let p = camera.view_to_clip;
+    match encoding {
+        DepthEncoding::Device | DepthEncoding::ReversedDevice => [p.w_axis.z, -p.w_axis.w, -p.z_axis.z, p.z_axis.w],
+        DepthEncoding::Linear => [0.0, 1.0, 1.0, 0.0],
+    }
+}
+
 fn columns(matrix: DMat4) -> [[f32; 4]; 4] {
     matrix.as_mat4().to_cols_array_2d()
 }
@@ -269,10 +280,10 @@ pub(crate) fn constants(
     let world_from_prev_pixel =
         DMat4::from_translation(-eye) * prev_camera.world_to_view.as_dmat4().inverse() * view_from_prev_pixel;
 
-    let (depth_from_device, sky_depth) = match conventions.depth {
-        DepthEncoding::Device => ([p.w_axis.z, -p.w_axis.w, -p.z_axis.z, p.z_axis.w], [f32::MIN, 1.0]),
-        DepthEncoding::ReversedDevice => ([p.w_axis.z, -p.w_axis.w, -p.z_axis.z, p.z_axis.w], [0.0, f32::MAX]),
-        DepthEncoding::Linear => ([0.0, 1.0, 1.0, 0.0], [0.0, conventions.sky_distance]),
+    let sky_depth = match conventions.depth {
+        DepthEncoding::Device => [f32::MIN, 1.0],
+        DepthEncoding::ReversedDevice => [0.0, f32::MAX],
+        DepthEncoding::Linear => [0.0, conventions.sky_distance],
     };
     let jitter = camera.jitter.as_dvec2();
     let prev_jitter = prev_camera.jitter.as_dvec2();
@@ -293,7 +304,8 @@ pub(crate) fn constants(
         prev_uv_from_world: columns(prev_uv_from_world),
         world_from_prev_pixel: columns(world_from_prev_pixel),
         environment_from_world: columns(DMat4::from_mat3(environment)),
-        depth_from_device: depth_from_device.map(|x| x as f32),
+        depth_from_device: depth_from_device(conventions.depth, camera),
+        prev_depth_from_device: depth_from_device(conventions.depth, &prev_camera),
         neighborhood_weights: [1.0, 2.0, 3.0, 4.0].map(neighborhood),
         forward: (view_to_relative * DVec4::new(0.0, 0.0, sign, 0.0)).normalize().as_vec4().to_array(),
         clip_w: clip_w.as_vec2().to_array(),

@@ -40,6 +40,7 @@ const SOURCES: &[(&str, &str)] = sources![
     "shared/fallback",
     "shared/footprint",
     "shared/frame",
+    "shared/gbuffer",
     "shared/history",
     "shared/neighborhood",
     "shared/outliers",

@@ -34,6 +34,28 @@ pub(crate) const OUTPUT_VARIABLE: &str = "out_output";
 /// What the caller reads besides the denoised image: the debug view, and the ray list with its length.
 pub(crate) const EXPORTED: &[&str] = &[DEBUG_VIEW, "rays", "args"];
 
+/// What variables are that several kernels share.
+pub(crate) const SHARED_BINDINGS: &[(&str, &str, Copy)] = &[
+    ("frame", "frame", Current),
+    ("in_normal", "normal", Current),
+    ("in_roughness", "roughness", Current),
+    ("in_depth", "depth", Current),
+    ("in_prev_normal", "prev_normal", Current),
+    ("in_prev_roughness", "prev_roughness", Current),
+    ("in_prev_depth", "prev_depth", Current),
+    ("in_guide", "guide", Current),
+];
+
+/// Overrides of `kernels/shared/gbuffer.wgsl`.
+pub(crate) const GBUFFER_OVERRIDES: &[&str] = &[
+    "NORMAL_ENCODING",
+    "ROUGHNESS_CHANNEL",
+    "ROUGHNESS_IS_ALPHA",
+    "ROUGHNESS_IS_CONSTANT",
+    "GUIDE_IS_PACKED",
+    "GBUFFER_IS_COPIED",
+];
+
 /// A pass before it is known which of its bindings the specialised kernel keeps.
 pub(crate) struct PassTemplate {
     pub(crate) name: &'static str,
@@ -64,7 +86,6 @@ const FILL: PassTemplate = PassTemplate {
     bindings: &[
         ("in_radiance", "radiance", Current),
         ("in_environment", "environment", Current),
-        ("in_guide", "guide", Current),
         ("in_tiles", "tiles", Current),
         ("in_args", "args", Current),
         ("out_prev_guide", "prev_guide", Current),
@@ -82,18 +103,8 @@ const PASSES: &[PassTemplate] = &[
         is_needed: always,
         stage: Stage::Classify,
         grid: GridTemplate::Tiles,
-        overrides: &[
-            "NORMAL_ENCODING",
-            "ROUGHNESS_CHANNEL",
-            "ROUGHNESS_IS_ALPHA",
-            "ROUGHNESS_IS_CONSTANT",
-            "RAYS_PER_QUAD",
-            "RAYS_FOLLOW_VARIANCE",
-        ],
+        overrides: &["RAYS_PER_QUAD", "RAYS_FOLLOW_VARIANCE"],
         bindings: &[
-            ("in_normal", "normal", Current),
-            ("in_roughness", "roughness", Current),
-            ("in_depth", "depth", Current),
             ("in_history", LAST_OUTPUT, Current),
             ("out_guide", "guide", Current),
             ("out_tile_flags", "tile_flags", Current),
@@ -137,7 +148,6 @@ const PASSES: &[PassTemplate] = &[
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
-            ("in_guide", "guide", Current),
             ("in_prev_guide", "guide", Previous),
             ("in_history", OUTPUT, Current),
             ("in_prev_signal", "signal", Previous),
@@ -158,7 +168,6 @@ const PASSES: &[PassTemplate] = &[
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
-            ("in_guide", "guide", Current),
             ("in_prev_guide", "guide", Previous),
             ("in_history", OUTPUT, Current),
             ("in_reprojected", "signal", Current),
@@ -175,7 +184,6 @@ const PASSES: &[PassTemplate] = &[
         overrides: &[],
         bindings: &[
             ("in_radiance", "radiance", Current),
-            ("in_guide", "guide", Current),
             ("in_reprojected", "signal", Current),
             ("in_average", "average", Current),
             ("in_tiles", "tiles", Current),
@@ -194,7 +202,6 @@ const PASSES: &[PassTemplate] = &[
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_environment", "environment", Current),
-            ("in_guide", "guide", Current),
             ("in_reprojected", "signal", Current),
             ("in_prefiltered", "signal", Previous),
             ("in_average", "average", Current),
@@ -211,13 +218,12 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
     PassTemplate {
         name: "block_average",
         kernel: "block_average",
-        is_needed: always,
+        is_needed: has_input_blocks,
         stage: Stage::Denoise,
         grid: GridTemplate::List(3),
         overrides: &["OUTLIER_SPREAD", "SAMPLES_ARE_USED"],
         bindings: &[
             ("in_radiance", "radiance", Current),
-            ("in_guide", "guide", Current),
             ("in_tiles", "tiles", Current),
             ("in_args", "args", Current),
             ("out_blocks", BLOCKS, Current),
@@ -227,7 +233,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
     PassTemplate {
         name: "block_statistics",
         kernel: "block_statistics",
-        is_needed: always,
+        is_needed: has_input_blocks,
         stage: Stage::Denoise,
         grid: GridTemplate::List(3),
         overrides: &["LIGHT_CHANGE", "SURFACE_MOTION"],
@@ -262,11 +268,17 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         is_needed: always,
         stage: Stage::Denoise,
         grid: GridTemplate::List(0),
-        overrides: &["MIRROR_PARALLAX", "SURFACE_MOTION", "HISTORY_CLIP", "LIGHT_CHANGE", "OUTLIER_SPREAD"],
+        overrides: &[
+            "MIRROR_PARALLAX",
+            "SURFACE_MOTION",
+            "HISTORY_CLIP",
+            "LIGHT_CHANGE",
+            "OUTLIER_SPREAD",
+            "BLOCK_STATISTICS",
+        ],
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
-            ("in_guide", "guide", Current),
             ("in_prev_guide", "prev_guide", Current),
             ("in_history", "history", Previous),
             ("in_blocks", BLOCKS, Current),
@@ -284,11 +296,10 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         is_needed: has_debug_view,
         stage: Stage::Denoise,
         grid: GridTemplate::Tiles,
-        overrides: &["VIEW", "MIRROR_PARALLAX", "SURFACE_MOTION", "OUTLIER_SPREAD"],
+        overrides: &["VIEW", "MIRROR_PARALLAX", "SURFACE_MOTION", "OUTLIER_SPREAD", "BLOCK_STATISTICS"],
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
-            ("in_guide", "guide", Current),
             ("in_prev_guide", "prev_guide", Current),
             ("in_history", "history", Previous),
             ("in_blocks", BLOCKS, Current),
@@ -305,7 +316,6 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         grid: GridTemplate::List(3),
         overrides: &["ACCUMULATED"],
         bindings: &[
-            ("in_guide", "guide", Current),
             ("in_history", "history", Current),
             ("in_tiles", "tiles", Current),
             ("in_args", "args", Current),
@@ -337,7 +347,6 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_environment", "environment", Current),
-            ("in_guide", "guide", Current),
             ("in_history", "history", Current),
             ("in_blocks", BLOCKS, Current),
             ("in_tiles", "tiles", Current),
@@ -358,6 +367,11 @@ pub(crate) fn templates(pipeline: Pipeline) -> Vec<&'static PassTemplate> {
 
 fn always(_: &Settings) -> bool {
     true
+}
+
+/// Whether a pass uses averages over blocks of the input.
+fn has_input_blocks(settings: &Settings) -> bool {
+    settings.features.compares_with_blocks() || settings.features.light_change
 }
 
 fn has_wide_filter(settings: &Settings) -> bool {
@@ -388,6 +402,9 @@ pub(crate) fn all_resources() -> Vec<Resource> {
         input("depth"),
         input("motion"),
         input("environment"),
+        input("prev_normal"),
+        input("prev_roughness"),
+        input("prev_depth"),
         resource("guide", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
         resource("prev_guide", texture(Format::R32Uint, Extent::Full), Lifetime::Persistent, false),
         resource("signal", texture(Format::Rg32Uint, Extent::Full), Lifetime::Persistent, true),
@@ -436,12 +453,23 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         },
         "RAYS_FOLLOW_VARIANCE" => f64::from(ray_list.is_some_and(|list| list.variance_threshold.is_some())),
         "ROUGHNESS_IS_CONSTANT" => f64::from(features.constant_roughness.is_some()),
+        // The published pipeline's copy of the G-buffer is the packed guide.
+        "GUIDE_IS_PACKED" => {
+            let is_copy = settings.pipeline == Pipeline::Published && features.gbuffer_copy;
+            f64::from(features.packed_guide || is_copy)
+        }
+        "GBUFFER_IS_COPIED" => f64::from(features.gbuffer_copy),
         "AVERAGE_IS_USED" => f64::from(settings.pipeline == Pipeline::Published && features.uses_average()),
-        "PREV_GUIDE_IS_KEPT" | "BLOCKS_ARE_USED" => f64::from(settings.pipeline == Pipeline::Footprint),
+        "PREV_GUIDE_IS_KEPT" => f64::from(settings.pipeline == Pipeline::Footprint && features.gbuffer_copy),
+        "BLOCKS_ARE_USED" => {
+            let has_blocks = has_input_blocks(settings) || has_wide_filter(settings);
+            f64::from(settings.pipeline == Pipeline::Footprint && has_blocks)
+        }
         // The template that names it means it.
         "ACCUMULATED" => 1.0,
         "LIGHT_CHANGE" => f64::from(features.light_change),
         "OUTLIER_SPREAD" => f64::from(features.outlier_spread),
+        "BLOCK_STATISTICS" => f64::from(features.compares_with_blocks()),
         "SAMPLES_ARE_USED" => f64::from(features.light_change || features.outlier_spread),
         "NEAR_TAPS" => f64::from(if features.spatial_filter { features.near_taps } else { 0 }),
         "WIDE_FILTER" => f64::from(has_wide_filter(settings)),

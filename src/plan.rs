@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::frame::check_allocation;
-use crate::kernel::{Kernel, Overrides, Sources};
+use crate::kernel::{self, Kernel, Overrides, Sources};
 use crate::passes::{
-    ARGS_STRIDE, BLOCKS, EXPORTED, GridTemplate, OTHER_BLOCKS, OUTPUT_VARIABLE, PassTemplate, all_resources,
-    override_value, resource_of, templates,
+    ARGS_STRIDE, BLOCKS, EXPORTED, GBUFFER_OVERRIDES, GridTemplate, OTHER_BLOCKS, OUTPUT_VARIABLE, PassTemplate,
+    SHARED_BINDINGS, all_resources, override_value, resource_of, templates,
 };
-use crate::resource::Copy::{self, Current, Previous};
+use crate::resource::Copy::{self, Previous};
 use crate::resource::{Access, Kind, Lifetime, Resource};
 use crate::settings::Settings;
 use crate::variants::Variants;
@@ -123,10 +123,13 @@ impl Turns {
 fn plan_pass<K: AsRef<Kernel>>(
     template: &PassTemplate,
     settings: &Settings,
+    sources: &Sources,
     make: &mut impl FnMut(&PassTemplate, &Overrides) -> Result<K, Error>,
 ) -> Result<(Pass, K), Error> {
-    let overrides: Overrides =
-        template.overrides.iter().map(|&name| (name.to_owned(), override_value(settings, name))).collect();
+    let linked = kernel::link(template.kernel, sources)?;
+    let shared = GBUFFER_OVERRIDES.iter().filter(|name| linked.text.contains(&format!("override {name}:")));
+    let names = template.overrides.iter().chain(shared);
+    let overrides: Overrides = names.map(|&name| (name.to_owned(), override_value(settings, name))).collect();
     let made = make(template, &overrides)?;
     let kernel = made.as_ref();
     let mut bindings = Vec::new();
@@ -134,9 +137,9 @@ fn plan_pass<K: AsRef<Kernel>>(
         let (resource, copy) = template
             .bindings
             .iter()
+            .chain(SHARED_BINDINGS)
             .find(|(variable, ..)| *variable == binding.name)
             .map(|&(_, resource, copy)| resource_of(settings.pipeline, resource, copy))
-            .or((binding.name == "frame").then_some(("frame", Current)))
             .ok_or_else(|| Error::Kernel {
                 kernel: template.kernel,
                 stage: "plan",
@@ -180,7 +183,7 @@ impl Plan {
     ///
     /// As [`Plan::new`]; [`Error::Kernel`] with file and line for mistakes in the sources.
     pub fn from_sources(settings: &Settings, size: UVec2, sources: &Sources) -> Result<(Self, Vec<Kernel>), Error> {
-        Self::with_kernels(settings, size, |template, overrides| {
+        Self::with_kernels(settings, size, sources, |template, overrides| {
             Ok(Kernel::from_sources(template.kernel, overrides, sources)?.renamed(template.name))
         })
     }
@@ -191,7 +194,7 @@ impl Plan {
         size: UVec2,
         variants: &mut Variants,
     ) -> Result<(Self, Vec<Arc<Kernel>>), Error> {
-        Self::with_kernels(settings, size, |template, overrides| {
+        Self::with_kernels(settings, size, &Sources::BuiltIn, |template, overrides| {
             variants.kernel(template.name, template.kernel, overrides)
         })
     }
@@ -199,6 +202,7 @@ impl Plan {
     fn with_kernels<K: AsRef<Kernel>>(
         settings: &Settings,
         size: UVec2,
+        sources: &Sources,
         mut make: impl FnMut(&PassTemplate, &Overrides) -> Result<K, Error>,
     ) -> Result<(Self, Vec<K>), Error> {
         settings.validate()?;
@@ -207,7 +211,7 @@ impl Plan {
         let mut kernels = Vec::new();
         let mut turns = Turns::default();
         for template in templates(settings.pipeline).into_iter().filter(|template| (template.is_needed)(settings)) {
-            let (mut pass, kernel) = plan_pass(template, settings, &mut make)?;
+            let (mut pass, kernel) = plan_pass(template, settings, sources, &mut make)?;
             turns.take(&mut pass.bindings);
             passes.push(pass);
             kernels.push(kernel);
@@ -274,7 +278,7 @@ impl fmt::Display for Plan {
                 Kind::Buffer { stride, count, .. } => format!("{} x {stride} bytes", count.of(self.size)),
             };
             let pair = if resource.ping_pong { " pair" } else { "" };
-            writeln!(f, "  {:<14}{:?} {kind}{pair}", resource.name, resource.lifetime)?;
+            writeln!(f, "  {:<15}{:?} {kind}{pair}", resource.name, resource.lifetime)?;
         }
         for pass in &self.passes {
             let grid = match &pass.grid {

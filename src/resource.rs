@@ -89,6 +89,16 @@ impl Extent {
     }
 }
 
+/// Size in pixels that an input has to have at least in a frame of `size` pixels after one of `prev_size` (zero where
+/// there is no history).
+pub fn input_size(input: &str, size: UVec2, prev_size: UVec2) -> UVec2 {
+    match input {
+        "environment" => UVec2::ONE,
+        "prev_normal" | "prev_roughness" | "prev_depth" => prev_size.max(UVec2::ONE),
+        _ => size,
+    }
+}
+
 /// Number of elements of a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -275,6 +275,10 @@ pub struct Features {
     /// Footprint pipeline: cuts outliers off and adds what was cut off, spread, up to a limit. An input without
     /// fireflies needs none of it.
     pub outlier_spread: bool,
+    /// Footprint pipeline: compares history with averages of this frame's input over blocks around the pixel, and takes
+    /// hit distances from there where single ones say little. Mirrors, whose samples hold no noise, need none. Only
+    /// without `outlier_spread` too is it left out, which needs them.
+    pub block_statistics: bool,
     /// Footprint pipeline: filters over blocks where the footprint is wider than a few pixels. A scene of smooth
     /// surfaces has no such footprints.
     pub wide_filter: bool,
@@ -282,6 +286,13 @@ pub struct Features {
     pub near_taps: u32,
     /// Perceptual roughness, 0 to 1, where it is the same everywhere: then there is no `roughness` input.
     pub constant_roughness: Option<f32>,
+    /// Keeps what the next frame needs of the G-buffer. Without it the renderer, which double-buffers its own,
+    /// supplies last frame's as `prev_normal`, `prev_roughness` and `prev_depth`.
+    pub gbuffer_copy: bool,
+    /// Decodes the G-buffer once, into 8 bytes a pixel that all other passes read. Without it they decode `normal`,
+    /// `roughness` and `depth` themselves. In the published pipeline only together with `gbuffer_copy`, as there the
+    /// packed guide is the copy.
+    pub packed_guide: bool,
     /// Shows in colours what limpid finds out about each pixel, in one more pass and texture.
     pub debug_view: Option<DebugView>,
 }
@@ -298,9 +309,12 @@ impl Default for Features {
             average_mixing: true,
             light_change: true,
             outlier_spread: true,
+            block_statistics: true,
             wide_filter: true,
             near_taps: 12,
             constant_roughness: None,
+            gbuffer_copy: true,
+            packed_guide: true,
             debug_view: None,
         }
     }
@@ -310,6 +324,11 @@ impl Features {
     /// Whether any pass of the published pipeline uses the 8x8 averages.
     pub(crate) fn uses_average(&self) -> bool {
         self.spatial_filter || self.history_clip || self.average_mixing
+    }
+
+    /// Whether `accumulate` reads the blocks of the input.
+    pub(crate) fn compares_with_blocks(&self) -> bool {
+        self.block_statistics || self.outlier_spread
     }
 
     fn validate(&self, pipeline: Pipeline) -> Result<(), Error> {
@@ -324,6 +343,12 @@ impl Features {
             return refuse(
                 "the debug view average needs an average: spatial_filter, history_clip or average_mixing has to be on",
             );
+        }
+        if self.debug_view == Some(DebugView::Average)
+            && pipeline == Pipeline::Footprint
+            && !self.compares_with_blocks()
+        {
+            return refuse("the debug view average needs an average: block_statistics or outlier_spread has to be on");
         }
         check_range("features.near_taps", self.near_taps as f32, 0.0, 64.0, "0 to 64")?;
         if let Some(roughness) = self.constant_roughness {

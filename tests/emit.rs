@@ -88,7 +88,7 @@ fn comments_and_names_are_those_of_the_sources() {
         "// Bit test: compilers fold `x == x` to true.\nbool is_finite(float x) {",
         "    // The pixel's own tile has an average and a weight of at least a quarter.\n    return",
         "    for (uint entry = lane; entry < WINDOW_COUNT; entry += 64u) {",
-        "Texture2D<uint4> in_guide : register(t1, space1);",
+        "Texture2D<uint4> in_guide : register(t12, space1);",
         "SPDX-License-Identifier",
     ] {
         assert!(text.contains(part), "`{part}` is not in\n{text}");

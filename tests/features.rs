@@ -21,6 +21,13 @@ const OFF: [(&str, Change); 5] = [
     ("constant_roughness", |features| features.constant_roughness = Some(0.3)),
 ];
 
+/// What is off costs memory of limpid's, in exchange for reads.
+const READ_INSTEAD: [(&str, Change); 3] = [
+    ("gbuffer_copy", |features| features.gbuffer_copy = false),
+    ("packed_guide", |features| features.packed_guide = false),
+    ("both", |features| (features.gbuffer_copy, features.packed_guide) = (false, false)),
+];
+
 /// Those that one of them has besides.
 fn off(pipeline: Pipeline) -> Vec<(&'static str, Change)> {
     let published: [(&str, Change); 3] = [
@@ -28,11 +35,12 @@ fn off(pipeline: Pipeline) -> Vec<(&'static str, Change)> {
         ("edge_repair", |features| features.edge_repair = false),
         ("average_mixing", |features| features.average_mixing = false),
     ];
-    let footprint: [(&str, Change); 4] = [
+    let footprint: [(&str, Change); 5] = [
         ("light_change", |features| features.light_change = false),
         ("outlier_spread", |features| features.outlier_spread = false),
         ("wide_filter", |features| features.wide_filter = false),
         ("near_taps", |features| features.near_taps = 0),
+        ("block_statistics", |features| features.block_statistics = false),
     ];
     let own: &[_] = if pipeline == Pipeline::Published { &published } else { &footprint };
     OFF.iter().chain(own).copied().collect()
@@ -91,14 +99,38 @@ fn what_is_off_costs_nothing() {
             let without = Cost::of(&with(pipeline, &[change]));
             println!("{name}: {} of {} words, {} bytes", without.words(), everything.words(), without.bytes);
             assert!(without.is_within(&everything), "{name}: {without:?} and {everything:?}");
-            // The number of taps is a number.
-            assert!(without.words() < everything.words() || name == "near_taps", "{name}");
+            // The number of taps is a number; blocks are there for outliers too.
+            let is_same = ["near_taps", "block_statistics"].contains(&name);
+            assert!(without.words() < everything.words() || is_same, "{name}");
             // On top of each other too.
             for (other_name, other) in off(pipeline) {
                 let settings = with(pipeline, &[change, other]);
                 if settings.validate().is_ok() {
                     assert!(Cost::of(&settings).is_within(&without), "{name} and {other_name}");
                 }
+            }
+        }
+    }
+}
+
+/// Less is fewer bytes, and no pass that was not there before: instructions and bindings may be more. What else is off costs
+/// no more than with everything on, whatever is read.
+#[test]
+fn what_is_read_instead_of_kept_costs_less_memory() {
+    for pipeline in [Pipeline::Footprint, Pipeline::Published] {
+        let (everything, bytes) =
+            (Cost::of(&with(pipeline, &[])), |pixel: u64| pixel * u64::from(SIZE.element_product()));
+        let copy = if pipeline == Pipeline::Footprint { 4 } else { 8 };
+        // The copy of the published pipeline is the packed guide.
+        let packed = if pipeline == Pipeline::Footprint { 8 } else { 0 };
+        for ((name, change), saved) in READ_INSTEAD.into_iter().zip([copy, packed, copy + 8]) {
+            let reading = Cost::of(&with(pipeline, &[change]));
+            println!("{name}: {} of {} words, {} bytes", reading.words(), everything.words(), reading.bytes);
+            assert_eq!(reading.bytes + bytes(saved), everything.bytes, "{name}");
+            assert!(reading.passes.iter().map(|(pass, ..)| pass).eq(everything.passes.iter().map(|(pass, ..)| pass)));
+            for (other_name, other) in off(pipeline) {
+                let without = Cost::of(&with(pipeline, &[change, other]));
+                assert!(without.is_within(&reading), "{other_name} with {name}");
             }
         }
     }
@@ -170,6 +202,45 @@ fn what_a_scene_does_not_use_changes_nothing() {
     // The comparison notices what is used.
     let filtered = run(&rough, executor, &[no_filter]);
     assert!(full.iter().zip(&filtered).any(|(a, b)| a.output() != b.output()));
+}
+
+/// A packed guide rounds normals, and the footprint pipeline's copy of the G-buffer everything: as little as that is what
+/// comes out may differ. Which tiles are denoised is the same to the bit.
+#[test]
+fn a_gbuffer_read_where_it_is_says_what_a_kept_one_says() {
+    let executor = &mut *fastest();
+    for pipeline in [Pipeline::Footprint, Pipeline::Published] {
+        let mut case = Case::still(SIZE, 6, |frame, p| {
+            let value = 0.5 + noise(frame, p);
+            let tilt = [0.3 * noise(7, p / 16), 0.1, 1.0];
+            // Blocks of sky, and of surfaces beyond the threshold.
+            let depth = if noise(9, p / 8) < 0.1 { 0.0 } else { 4.0 };
+            let roughness = noise(8, p / 12);
+            Pixel { radiance: [value, 0.5 * value, 0.25, 3.0], normal: tilt, roughness, depth, ..Pixel::WALL }
+        });
+        case.settings.pipeline = pipeline;
+        case.settings.coverage.roughness_threshold = 0.8;
+        let full = run(&case, executor, &[]);
+        for (name, change) in READ_INSTEAD {
+            let reading = run(&case, executor, &[change]);
+            for (full, reading) in full.iter().zip(&reading) {
+                for list in ["tile_flags", "tiles", "args"] {
+                    assert_eq!(full.0[list], reading.0[list], "{name}: {list}");
+                }
+                for (a, b) in full.output().into_iter().zip(reading.output()) {
+                    let apart = (a[0] - b[0]).abs();
+                    assert!(apart <= 0.01 * a[0], "{name}: {a:?} and {b:?}");
+                }
+            }
+        }
+        // The comparison notices a G-buffer that is another frame's.
+        let off = READ_INSTEAD[2].1;
+        let mut other = case.clone();
+        other.steps[4].images.pixels.iter_mut().for_each(|pixel| pixel.depth *= 2.0);
+        let (a, b) = (run(&case, executor, &[off]), run(&other, executor, &[off]));
+        let differs = a[5].output().into_iter().zip(b[5].output()).any(|(a, b)| (a[0] - b[0]).abs() > 0.01 * a[0]);
+        assert!(differs);
+    }
 }
 
 #[test]

@@ -4,10 +4,10 @@ use std::cell::RefCell;
 
 use glam::{Mat4, UVec2, Vec3};
 use limpid::Preset;
-use limpid::settings::{DepthEncoding, Fallback};
+use limpid::settings::{DepthEncoding, Fallback, Pipeline};
 use limpid_harness::executor::Cpu;
 use limpid_harness::strategy::{any_spec, noise};
-use limpid_harness::{Case, Executor, Pixel, Snapshot, fastest, runner};
+use limpid_harness::{Case, Executor, Images, Pixel, Snapshot, Step, fastest, runner};
 use proptest::prelude::*;
 
 /// One rounding of a half float, relative.
@@ -243,6 +243,92 @@ fn what_is_no_number_counts_as_black_and_is_soon_forgotten() {
         let last = last_output(&poisoned).into_iter().zip(last_output(&clean));
         for (a, b) in last {
             prop_assert!((a[0] - b[0]).abs() <= 0.05 * b[0], "{} instead of {}", a[0], b[0]);
+        }
+        Ok(())
+    });
+}
+
+/// A case for which the renderer supplies last frame's G-buffer.
+fn supplied(mut case: Case, pipeline: Pipeline) -> Case {
+    case.settings.pipeline = pipeline;
+    (case.settings.features.gbuffer_copy, case.settings.features.packed_guide) = (false, false);
+    case
+}
+
+fn any_pipeline() -> impl Strategy<Value = Pipeline> {
+    prop::sample::select(vec![Pipeline::Footprint, Pipeline::Published])
+}
+
+/// Runs a case with other images in the place of last frame's G-buffer, in some frames.
+fn run_with_prev(case: &Case, executor: &mut dyn Executor, prev: impl Fn(usize) -> Option<Images>) -> Vec<Snapshot> {
+    executor.start(case.core());
+    let frame = |(index, step): (usize, &Step)| {
+        let mut images = case.images(index);
+        if let Some(prev) = prev(index) {
+            images = step.images.images(&prev);
+        }
+        executor.frame(&images, &step.frame)
+    };
+    case.steps.iter().enumerate().map(frame).collect()
+}
+
+#[test]
+fn what_is_supplied_of_last_frame_matters_only_where_there_is_history() {
+    let anything = prop::sample::select(vec![0.0, 1.0, 4.0, -1.0, f32::NAN, f32::INFINITY, 3e38]);
+    let any = (any_still(), any_pipeline(), anything, 1usize..4);
+    for_all(12, any, |executor, ((size, roughness, seed), pipeline, value, cut)| {
+        let mut case = Case::still(size, 5, |frame, p| Pixel {
+            radiance: [0.5 + noise(seed + frame, p), 0.5, 1.0, 3.0],
+            roughness,
+            ..Pixel::WALL
+        });
+        case.steps[cut].frame.reset = true;
+        let case = supplied(case, pipeline);
+        let nonsense =
+            |size| Images::new(size, |_| Pixel { normal: [value; 3], roughness: value, depth: value, ..Pixel::WALL });
+        let right = case.run(executor);
+        // Where there is no history a texel will do.
+        let other = run_with_prev(&case, executor, |index| (index == 0 || index == cut).then(|| nonsense(UVec2::ONE)));
+        for (right, other) in right.iter().zip(&other) {
+            prop_assert_eq!(&right.0["output"], &other.0["output"]);
+        }
+        // Elsewhere it is the difference between history and none.
+        let other = run_with_prev(&case, executor, |index| (index == 4).then(|| nonsense(size)));
+        prop_assert!(other[4].is_finite());
+        let is_surface = value == 4.0;
+        prop_assert!(is_surface || right[4].output() != other[4].output(), "{} is as good", value);
+        Ok(())
+    });
+}
+
+#[test]
+fn what_is_no_surface_in_last_frames_gbuffer_costs_history_there_alone() {
+    let poison = prop::sample::select(vec![f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0]);
+    let place = (0.0f32..1.0, 0.0f32..1.0);
+    let any = (any_still(), any_pipeline(), poison, 0usize..3, place);
+    for_all(12, any, |executor, ((size, roughness, seed), pipeline, poison, which, place)| {
+        let at = (size.as_vec2() * glam::Vec2::from(place)).as_uvec2().min(size - 1);
+        let case = Case::still(size, 3, |frame, p| Pixel {
+            radiance: [0.5 + noise(seed + frame, p), 0.5, 1.0, 3.0],
+            roughness,
+            ..Pixel::WALL
+        });
+        let case = supplied(case, pipeline);
+        let poisoned = run_with_prev(&case, executor, |index| {
+            (index == 2).then(|| {
+                Images::new(size, |p| match (p == at, which) {
+                    (false, _) => Pixel { roughness, ..Pixel::WALL },
+                    (true, 0) => Pixel { normal: [poison; 3], roughness, ..Pixel::WALL },
+                    // No roughness is no surface, but 0 is one.
+                    (true, 1) => Pixel { roughness: if poison == 0.0 { f32::NAN } else { poison }, ..Pixel::WALL },
+                    (true, _) => Pixel { depth: poison, roughness, ..Pixel::WALL },
+                })
+            })
+        });
+        prop_assert!(poisoned[2].is_finite());
+        for (index, (a, b)) in poisoned[2].output().into_iter().zip(case.run(executor)[2].output()).enumerate() {
+            let p = glam::IVec2::new(index as i32 % size.x as i32, index as i32 / size.x as i32);
+            prop_assert!(a == b || (p - at.as_ivec2()).abs().max_element() <= FOOTPRINT, "reaches {}", p);
         }
         Ok(())
     });

@@ -71,6 +71,20 @@ proptest! {
         let features = &settings.features;
         prop_assert_eq!(plan.inputs().any(|i| i == "motion"), features.surface_motion);
         let is_published = settings.pipeline == Pipeline::Published;
+        let has_input = |name: &str| plan.inputs().any(|input| input == name);
+        prop_assert_eq!(has_input("prev_normal"), !features.gbuffer_copy);
+        prop_assert_eq!(has_input("prev_depth"), !features.gbuffer_copy);
+        let reads_prev_roughness = !features.gbuffer_copy && features.constant_roughness.is_none();
+        prop_assert_eq!(has_input("prev_roughness"), reads_prev_roughness);
+        prop_assert_eq!(plan.resource("prev_guide").is_some(), !is_published && features.gbuffer_copy);
+        let has_guide = features.packed_guide || (is_published && features.gbuffer_copy);
+        prop_assert_eq!(plan.resource("guide").is_some(), has_guide);
+        for pass in &plan.passes {
+            // The least that WebGPU offers a stage.
+            let sampled = pass.bindings.iter().filter(|b| b.access == Access::Read);
+            let textures = sampled.filter(|b| !matches!(b.variable.as_str(), "frame" | "in_tiles" | "in_args"));
+            prop_assert!(textures.count() <= 16, "{}", pass.name);
+        }
         let has_pass = |kernel: &str| plan.passes.iter().any(|pass| pass.kernel == kernel);
         prop_assert_eq!(plan.inputs().any(|i| i == "roughness"), features.constant_roughness.is_none());
         prop_assert_eq!(has_pass("prefilter"), is_published && features.spatial_filter);
@@ -79,6 +93,11 @@ proptest! {
         prop_assert_eq!(plan.resource("light").is_some(), !is_published && features.light_change);
         prop_assert_eq!(plan.resource("debug_view").is_some(), features.debug_view.is_some());
         let spreads = usize::from(features.outlier_spread) + usize::from(features.spatial_filter && features.wide_filter);
+        let averages = usize::from(features.block_statistics || features.outlier_spread || features.light_change)
+            + usize::from(features.spatial_filter && features.wide_filter);
+        prop_assert_eq!(plan.resource("blocks").is_some(), !is_published && averages > 0);
+        let planned = plan.passes.iter().filter(|pass| pass.kernel == "block_average").count();
+        prop_assert_eq!(planned, if is_published { 0 } else { averages });
         let planned = plan.passes.iter().filter(|pass| pass.kernel == "block_spread").count();
         prop_assert_eq!(planned, if is_published { 0 } else { spreads });
         let names: HashSet<_> = plan.passes.iter().map(|pass| &pass.name).collect();
@@ -115,12 +134,60 @@ fn memory_stays_within_the_published_figure() {
     let pixels = f64::from(SIZE.x) * f64::from(SIZE.y);
     let bytes_per_pixel = (plan.memory().total() - counters_and_grids) as f64 / pixels;
     assert!(bytes_per_pixel - prev_guide <= 32.25, "{bytes_per_pixel}");
+    // 24.25 with last frame's G-buffer from the renderer, and this frame's read where it is.
+    let mut settings = Preset::Reference.settings();
+    (settings.features.gbuffer_copy, settings.features.packed_guide) = (false, false);
+    let (plan, _) = Plan::new(&settings, SIZE).unwrap();
+    assert!((plan.memory().total() - counters_and_grids) as f64 / pixels <= 24.25);
+    // The smallest set: a pair for history, and lists of tiles.
+    let mut settings = Settings::default();
+    let features = &mut settings.features;
+    (features.gbuffer_copy, features.packed_guide, features.light_change) = (false, false, false);
+    (features.outlier_spread, features.block_statistics, features.wide_filter) = (false, false, false);
+    let (plan, _) = Plan::new(&settings, SIZE).unwrap();
+    assert!((plan.memory().total() - counters_and_grids) as f64 / pixels <= 16.125);
     // 32.25 at most with all that is kept of last frame's G-buffer.
     let (plan, _) = Plan::new(&Settings::default(), SIZE).unwrap();
     assert!(plan.bytes_per_pixel() <= 32.25, "{}", plan.bytes_per_pixel());
     assert_eq!(plan.output(), Some(("history", limpid::resource::Copy::Previous)));
     let memory = plan.memory();
     assert_eq!(memory.total(), plan.resources.iter().map(|r| r.bytes(SIZE)).sum::<u64>());
+}
+
+/// What was denoised in the last frame is read from its G-buffer: by other rules it would be something else.
+#[test]
+fn history_is_lost_where_last_frames_gbuffer_would_say_otherwise() {
+    let projection = rh::proj::directx::perspective(1.0, 1.5, 0.1, 100.0);
+    let camera = Camera { world_to_view: Mat4::IDENTITY, view_to_clip: projection, jitter: Vec2::ZERO };
+    let frame = FrameInputs::new(camera, UVec2::new(640, 480));
+    for gbuffer_copy in [true, false] {
+        let mut settings = Settings::default();
+        settings.features.gbuffer_copy = gbuffer_copy;
+        let mut denoiser = Denoiser::new(&settings, SIZE).unwrap();
+        let run = |denoiser: &mut Denoiser| {
+            let expected = denoiser.prev_size(&frame);
+            let constants = denoiser.next_frame(&frame).unwrap().constants;
+            assert_eq!(UVec2::from_array(constants.prev_size), expected);
+            expected
+        };
+        assert_eq!(run(&mut denoiser), UVec2::ZERO);
+        // Not finished: none to follow.
+        assert_eq!(run(&mut denoiser), UVec2::ZERO);
+        // Between the stages of a frame, which goes on as it was begun.
+        settings.coverage.roughness_threshold = 0.5;
+        assert_eq!(denoiser.set_settings(&settings).unwrap(), Change::Constants);
+        assert!(denoiser.started_frame().is_ok());
+        denoiser.finish_frame();
+        assert_eq!(run(&mut denoiser), if gbuffer_copy { frame.size } else { UVec2::ZERO });
+        denoiser.finish_frame();
+        settings.accumulate.clip_scale = 2.0;
+        assert_eq!(denoiser.set_settings(&settings).unwrap(), Change::Constants);
+        assert_eq!(run(&mut denoiser), frame.size);
+        denoiser.finish_frame();
+        let mut cut = frame.clone();
+        cut.reset = true;
+        assert_eq!(denoiser.prev_size(&cut), UVec2::ZERO);
+    }
 }
 
 #[test]

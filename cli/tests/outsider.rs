@@ -55,6 +55,7 @@ fn runs() -> Vec<Run> {
     let mut few = Settings::default();
     (few.features.spatial_filter, few.features.light_change) = (false, false);
     few.features.constant_roughness = Some(0.25);
+    (few.features.gbuffer_copy, few.features.packed_guide) = (false, false);
     let few = case(&few, "mirrors", &[SIZE; 3]);
     vec![
         Run { name: "default", options: &[], case: default },
@@ -90,7 +91,7 @@ fn write_sequence(case: &Case, folder: &Path) {
     fs::create_dir(folder).unwrap();
     let mut frames = Vec::new();
     for (number, step) in case.steps.iter().enumerate() {
-        for image in step.images.images() {
+        for image in case.images(number) {
             let path = folder.join(format!("{number}.{}.raw", image.name));
             fs::write(path, bytemuck::cast_slice::<u32, u8>(&image.words)).unwrap();
         }
@@ -106,9 +107,8 @@ fn write_sequence(case: &Case, folder: &Path) {
             "reset": frame.reset,
         }));
     }
-    let inputs: Vec<Value> = case.steps[0]
-        .images
-        .images()
+    let inputs: Vec<Value> = case
+        .images(0)
         .iter()
         .map(|image| {
             let (format, texel_bytes) = format(image.format);

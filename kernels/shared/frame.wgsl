@@ -14,6 +14,8 @@ struct Frame {
     environment_from_world: mat4x4<f32>,
     // linear depth = |(x + y d) / (z + w d)| of the depth d that the caller supplies.
     depth_from_device: vec4<f32>,
+    // The same for last frame's.
+    prev_depth_from_device: vec4<f32>,
     // Weights of the Gaussian neighbourhood at 1, 2, 3 and 4 pixels; the centre has 1.
     neighborhood_weights: vec4<f32>,
     // World-space direction the camera looks in; w is unused.

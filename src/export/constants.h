@@ -16,7 +16,10 @@ typedef struct LimpidInputs {
     int reset;           /* not 0: history is of no use (camera cut) */
 } LimpidInputs;
 
-/* The frame that was denoised last. */
+/*
+ * The frame that was denoised last. Without the feature gbuffer_copy, set `reset` in the frame after a change of `depth`,
+ * `sky_distance`, `roughness_threshold` or `constant_roughness`: what was denoised is read from last frame's images.
+ */
 typedef struct LimpidPrevious {
     LimpidCamera camera;
     uint32_t size[2];
@@ -144,6 +147,16 @@ static inline double limpid_pixel_to_view(const LimpidSettings *settings, const 
     return sign;
 }
 
+/* Linear depth = |(out[0] + out[1] d) / (out[2] + out[3] d)| of the depth d that you supply. */
+static inline void limpid_fill_depth(const LimpidSettings *settings, const LimpidCamera *camera, float *out) {
+    const float *p = camera->view_to_clip;
+    const int is_linear = settings->depth == LIMPID_DEPTH_LINEAR;
+    out[0] = is_linear ? 0.0f : (float)limpid_at(p, 2, 3);
+    out[1] = is_linear ? 1.0f : (float)-limpid_at(p, 3, 3);
+    out[2] = is_linear ? 1.0f : (float)-limpid_at(p, 2, 2);
+    out[3] = is_linear ? 0.0f : (float)limpid_at(p, 3, 2);
+}
+
 /* Pixels and depth of this frame to positions relative to the camera. */
 static inline void limpid_fill_position(
     const LimpidSettings *settings, const LimpidInputs *inputs, const double *view_to_world, LimpidFrame *frame) {
@@ -165,17 +178,12 @@ static inline void limpid_fill_position(
     frame->forward[3] = 0.0f;
     frame->pixels_per_unit = (float)((double)inputs->size[1] * fabs(limpid_at(p, 1, 1)) / 2.0);
 
+    limpid_fill_depth(settings, &inputs->camera, frame->depth_from_device);
     if (settings->depth == LIMPID_DEPTH_LINEAR) {
-        const float linear[4] = {0.0f, 1.0f, 1.0f, 0.0f};
-        memcpy(frame->depth_from_device, linear, sizeof linear);
         frame->sky_depth[0] = 0.0f;
         frame->sky_depth[1] = settings->sky_distance;
     } else {
         const int is_reversed = settings->depth == LIMPID_DEPTH_REVERSED_DEVICE;
-        frame->depth_from_device[0] = (float)limpid_at(p, 2, 3);
-        frame->depth_from_device[1] = (float)-limpid_at(p, 3, 3);
-        frame->depth_from_device[2] = (float)-limpid_at(p, 2, 2);
-        frame->depth_from_device[3] = (float)limpid_at(p, 3, 2);
         frame->sky_depth[0] = is_reversed ? 0.0f : -FLT_MAX;
         frame->sky_depth[1] = is_reversed ? FLT_MAX : 1.0f;
     }
@@ -200,6 +208,7 @@ static inline void limpid_fill_reprojection(const LimpidSettings *settings, cons
     limpid_multiply(product, view, from_world);
     limpid_multiply(from_world, eye, from_relative);
     limpid_store(from_relative, frame->prev_uv_from_world);
+    limpid_fill_depth(settings, previous, frame->prev_depth_from_device);
 
     double prev_view_to_world[16], view_from_pixel[16], world_from_pixel[16];
     limpid_inverse(previous->world_to_view, prev_view_to_world);

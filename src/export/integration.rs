@@ -102,11 +102,16 @@ impl Export<'_> {
             }
             None => "Trace a ray for every pixel that reflects into `radiance`.",
         };
+        let previous = if self.settings.features.gbuffer_copy {
+            ""
+        } else {
+            " Those that begin with `prev_` are last frame's, encoded as this frame's; in the first frame and where `reset` is set they may hold anything. Set `reset` too in the frame after a change of `depth`, `sky_distance`, `roughness_threshold` or `constant_roughness`."
+        };
         format!(
             "## Steps\n\n1. {}\n2. Allocate the resources below; those with two copies twice. Before the first frame, and after a resize, set \
              what is persistent to zero: {}.\n3. Every frame, fill a constant buffer of {} bytes with `limpid_fill_constants` of `limpid.h`, from this frame's camera and the camera and size of the frame that was denoised last. Count \
              frames: in frame `n` the current copy of a pair is `n % 2`, the previous one the other.\n4. Dispatch {}.\n5. {rays} \
-             Your images: {}.\n6. Dispatch {}. The result is in {}: leave it as it is.\n\n",
+             Your images: {}.{previous}\n6. Dispatch {}. The result is in {}: leave it as it is.\n\n",
             words.pipeline,
             words.clear,
             manifest.constants.size,

@@ -69,6 +69,7 @@ unsafe fn run() -> Result<(), Box<dyn Error>> {
             depth: input(&depth),
             motion: input(&motion),
             environment: None,
+            previous: None,
         };
 
         // The denoiser. It would like to know which stages read its output: here it is copied.

@@ -302,7 +302,7 @@ impl Denoiser {
         inputs: &Inputs,
         frame: &FrameInputs,
     ) -> Result<(), Error> {
-        inputs.check(self.core.plan().inputs(), frame.size)?;
+        inputs.check(self.core.plan().inputs(), frame.size, self.core.prev_size(frame))?;
         let schedule = self.core.next_frame(frame)?;
         self.frames += 1;
         self.retired.retain(|(until, _)| *until > self.frames);
@@ -334,7 +334,8 @@ impl Denoiser {
     /// [`limpid::Error::Order`], or one of the `Input` errors. Nothing was recorded then.
     pub unsafe fn record_denoise(&mut self, commands: vk::CommandBuffer, inputs: &Inputs) -> Result<(), Error> {
         let schedule = self.core.started_frame()?.clone();
-        inputs.check(self.core.plan().inputs(), UVec2::from_array(schedule.constants.size))?;
+        let [size, prev_size] = [schedule.constants.size, schedule.constants.prev_size].map(UVec2::from_array);
+        inputs.check(self.core.plan().inputs(), size, prev_size)?;
         // SAFETY: the caller's promise.
         unsafe { self.record_stage(Stage::Denoise, commands, inputs, &schedule) };
         self.core.finish_frame();

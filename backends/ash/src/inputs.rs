@@ -1,5 +1,6 @@
 use ash::vk;
 use glam::UVec2;
+use limpid::resource::input_size;
 
 use crate::Error;
 
@@ -15,6 +16,18 @@ pub struct Input {
     pub layout: vk::ImageLayout,
     /// Its size in pixels.
     pub size: UVec2,
+}
+
+/// Last frame's G-buffer, encoded as this frame's and as large as that frame was. In the first frame, after a camera cut
+/// and after a resize it may be anything of any size.
+#[derive(Debug, Clone, Copy)]
+pub struct PrevGbuffer {
+    /// World-space normal.
+    pub normal: Input,
+    /// Roughness, in the channel that the settings name.
+    pub roughness: Input,
+    /// Depth.
+    pub depth: Input,
 }
 
 /// The caller's images of one frame. Encodings are set in
@@ -33,6 +46,8 @@ pub struct Inputs {
     pub motion: Input,
     /// Equirectangular radiance with its mip chain. Only for `Fallback::Environment`.
     pub environment: Option<Input>,
+    /// Last frame's G-buffer. Only without the feature `gbuffer_copy`.
+    pub previous: Option<PrevGbuffer>,
 }
 
 impl Inputs {
@@ -45,15 +60,23 @@ impl Inputs {
             "depth" => ("depth", Some(self.depth)),
             "motion" => ("motion", Some(self.motion)),
             "environment" => ("environment", self.environment),
+            "prev_normal" => ("previous.normal", self.previous.map(|previous| previous.normal)),
+            "prev_roughness" => ("previous.roughness", self.previous.map(|previous| previous.roughness)),
+            "prev_depth" => ("previous.depth", self.previous.map(|previous| previous.depth)),
             _ => return None,
         })
     }
 
-    pub(crate) fn check<'n>(&self, names: impl Iterator<Item = &'n str>, frame_size: UVec2) -> Result<(), Error> {
-        for (field, input) in names.filter_map(|name| self.find(name)) {
+    pub(crate) fn check<'n>(
+        &self,
+        names: impl Iterator<Item = &'n str>,
+        size: UVec2,
+        prev_size: UVec2,
+    ) -> Result<(), Error> {
+        for (name, (field, input)) in names.filter_map(|name| Some((name, self.find(name)?))) {
             let input = input.filter(|input| input.view != vk::ImageView::null());
             let input = input.ok_or(Error::InputMissing { input: field })?;
-            let expected = if field == "environment" { UVec2::ONE } else { frame_size };
+            let expected = input_size(name, size, prev_size);
             if input.size.cmplt(expected).any() {
                 return Err(Error::InputSize { input: field, actual: input.size, expected });
             }

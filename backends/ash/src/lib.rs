@@ -57,6 +57,6 @@ pub use ash;
 pub use denoiser::{Denoiser, OwnImage, RayList, Recorded};
 pub use error::Error;
 pub use gpu::{Gpu, Synchronization};
-pub use inputs::{Input, Inputs};
+pub use inputs::{Input, Inputs, PrevGbuffer};
 pub use options::{Options, SpirvSource};
 pub use timing::PassTime;

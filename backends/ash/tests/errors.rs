@@ -8,7 +8,7 @@ use limpid::settings::Fallback;
 use limpid::{Camera, FrameInputs, Settings};
 use limpid_ash::memory::{MemoryBlock, MemoryError, MemoryRequest, MemorySource};
 use limpid_ash::offscreen::{Context, ContextOptions, OffscreenError, Session, UploadedImage, UploadedInputs};
-use limpid_ash::{Denoiser, Error, Gpu, Input, Inputs, Options};
+use limpid_ash::{Denoiser, Error, Gpu, Input, Inputs, Options, PrevGbuffer};
 
 const SIZE: UVec2 = UVec2::new(24, 16);
 
@@ -106,6 +106,7 @@ fn inputs_that_do_not_fit_are_refused_and_nothing_is_recorded() {
         depth: single.input(),
         motion: wide.input(),
         environment: None,
+        previous: None,
     };
     let mut settings = Settings::default();
     // SAFETY: as above.
@@ -130,6 +131,18 @@ fn inputs_that_do_not_fit_are_refused_and_nothing_is_recorded() {
     refused(&good, UVec2::new(25, 16), &["`radiance`", "[25, 16]"]);
     // After all that the denoiser works.
     record(&mut denoiser, &good, &frame(SIZE)).unwrap();
+
+    settings.features.gbuffer_copy = false;
+    let mut denoiser = new(&settings);
+    let error = record(&mut denoiser, &good, &frame(SIZE)).unwrap_err().to_string();
+    assert!(error.contains("`previous.normal`") && error.contains("missing"), "{error}");
+    let previous = PrevGbuffer { normal: wide.input(), roughness: single.input(), depth: small };
+    let supplied = Inputs { previous: Some(previous), ..good };
+    // There is no last frame yet.
+    record(&mut denoiser, &supplied, &frame(SIZE)).unwrap();
+    let error = record(&mut denoiser, &supplied, &frame(SIZE)).unwrap_err().to_string();
+    assert!(["`previous.depth`", "[24, 15]", "[24, 16]"].iter().all(|part| error.contains(part)), "{error}");
+    settings.features.gbuffer_copy = true;
 
     settings.coverage.fallback = Fallback::Environment;
     let error = record(&mut new(&settings), &good, &frame(SIZE)).unwrap_err();
@@ -157,6 +170,7 @@ fn several_denoisers_live_on_one_device() {
         depth: &image,
         motion: &image,
         environment: None,
+        previous: None,
     };
     for _ in 0..2 {
         for session in &mut sessions {

@@ -4,11 +4,23 @@ use std::sync::Arc;
 use glam::UVec2;
 use limpid::kernel::Kernel;
 use limpid::plan::{Bound, DEBUG_VIEW, Grid, Pass, Stage};
-use limpid::resource::{Copy, Format, Kind, Lifetime};
+use limpid::resource::{Copy, Format, Kind, Lifetime, input_size};
 use limpid::variants::Made;
 use limpid::{Change, FrameConstants, FrameInputs, FrameSchedule, Plan, Settings};
 
 use crate::{Binding, Buffer, CompileError, Error, Executor, Fault, Probe, TexelFormat, Texture};
+
+/// Last frame's G-buffer, encoded as this frame's and as large as that frame was. In the first frame, after a camera cut
+/// and after a resize it may be anything of any size.
+#[derive(Debug, Clone, Copy)]
+pub struct PrevGbuffer<'a> {
+    /// World-space normal.
+    pub normal: &'a Texture,
+    /// Roughness, in the channel that the settings name.
+    pub roughness: &'a Texture,
+    /// Depth.
+    pub depth: &'a Texture,
+}
 
 /// The caller's images of one frame, of any format. Encodings are set in
 /// [`Settings::conventions`](limpid::settings::Conventions).
@@ -26,6 +38,8 @@ pub struct Inputs<'a> {
     pub motion: &'a Texture,
     /// Equirectangular radiance with its mip chain. Only for `Fallback::Environment`.
     pub environment: Option<&'a Texture>,
+    /// Last frame's G-buffer. Only without the feature `gbuffer_copy`.
+    pub previous: Option<PrevGbuffer<'a>>,
 }
 
 impl<'a> Inputs<'a> {
@@ -37,16 +51,20 @@ impl<'a> Inputs<'a> {
             "depth" => Some(self.depth),
             "motion" => Some(self.motion),
             "environment" => self.environment,
+            "prev_normal" => self.previous.map(|previous| previous.normal),
+            "prev_roughness" => self.previous.map(|previous| previous.roughness),
+            "prev_depth" => self.previous.map(|previous| previous.depth),
             _ => None,
         }
     }
 
-    fn check<'n>(&self, names: impl Iterator<Item = &'n str>, size: UVec2) -> Result<(), Error> {
+    fn check<'n>(&self, names: impl Iterator<Item = &'n str>, size: UVec2, prev_size: UVec2) -> Result<(), Error> {
         for name in names {
             let missing = || Error::InputMissing { input: name.to_owned() };
             let actual = UVec2::from_array(self.get(name).ok_or_else(missing)?.size());
-            if name != "environment" && actual.cmplt(size).any() {
-                return Err(Error::InputSize { input: name.to_owned(), actual, expected: size });
+            let expected = input_size(name, size, prev_size);
+            if actual.cmplt(expected).any() {
+                return Err(Error::InputSize { input: name.to_owned(), actual, expected });
             }
         }
         Ok(())
@@ -228,7 +246,7 @@ impl Denoiser {
     ///
     /// As [`denoise`](Self::denoise).
     pub fn run_classify(&mut self, inputs: &Inputs<'_>, frame: &FrameInputs) -> Result<(), Error> {
-        inputs.check(self.core.plan().inputs(), frame.size)?;
+        inputs.check(self.core.plan().inputs(), frame.size, self.core.prev_size(frame))?;
         let schedule = self.core.next_frame(frame)?;
         self.constants.write(bytemuck::cast_slice(&[schedule.constants]).iter().copied());
         self.run_stage(Stage::Classify, inputs, &schedule)
@@ -241,7 +259,8 @@ impl Denoiser {
     /// [`limpid::Error::Order`], or one of the `Input` errors.
     pub fn run_denoise(&mut self, inputs: &Inputs<'_>) -> Result<(), Error> {
         let schedule = self.core.started_frame()?.clone();
-        inputs.check(self.core.plan().inputs(), UVec2::from_array(schedule.constants.size))?;
+        let [size, prev_size] = [schedule.constants.size, schedule.constants.prev_size].map(UVec2::from_array);
+        inputs.check(self.core.plan().inputs(), size, prev_size)?;
         self.run_stage(Stage::Denoise, inputs, &schedule)?;
         self.core.finish_frame();
         Ok(())

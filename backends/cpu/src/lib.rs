@@ -60,7 +60,7 @@ mod resource;
 mod sampler;
 
 pub use check::{Fault, FaultKind};
-pub use denoiser::{Denoiser, Inputs};
+pub use denoiser::{Denoiser, Inputs, PrevGbuffer};
 pub use error::{CompileError, DispatchError, Error};
 pub use executor::{Binding, Executor};
 pub use probe::{Event, EventKind, OutputError, Probe};

@@ -3,7 +3,7 @@
 use glam::{Mat4, UVec2, Vec2, camera::rh};
 use limpid::settings::{Fallback, Pipeline, RayList, RaysPerQuad};
 use limpid::{Camera, FrameInputs, Settings};
-use limpid_cpu::{Binding, Buffer, Denoiser, Executor, Fault, FaultKind, Inputs, TexelFormat, Texture};
+use limpid_cpu::{Binding, Buffer, Denoiser, Executor, Fault, FaultKind, Inputs, PrevGbuffer, TexelFormat, Texture};
 
 /// Faults of one workgroup of 64 with a buffer of 64 words.
 fn faults(body: &str) -> Vec<(Fault, String)> {
@@ -101,14 +101,19 @@ fn kernels_do_nothing_of_the_kind() {
         jitter: Vec2::ZERO,
     };
     use Pipeline::{Footprint, Published};
-    for (pipeline, fallback, rays) in [
+    for (index, (pipeline, fallback, rays)) in [
         (Footprint, Fallback::Input, None),
         (Published, Fallback::Black, Some(RaysPerQuad::One)),
         (Footprint, Fallback::Environment, Some(RaysPerQuad::Two)),
         (Published, Fallback::Environment, None),
         (Footprint, Fallback::Input, Some(RaysPerQuad::Four)),
-    ] {
+    ]
+    .into_iter()
+    .enumerate()
+    {
         let mut settings = Settings::default();
+        settings.features.gbuffer_copy = index % 4 == 0;
+        settings.features.packed_guide = index < 2;
         settings.pipeline = pipeline;
         settings.conventions.depth = limpid::settings::DepthEncoding::Linear;
         settings.coverage.roughness_threshold = 0.7;
@@ -143,6 +148,7 @@ fn kernels_do_nothing_of_the_kind() {
                 depth: &depth,
                 motion: &motion,
                 environment: Some(&environment),
+                previous: Some(PrevGbuffer { normal: &normal, roughness: &roughness, depth: &depth }),
             };
             denoiser.denoise(&inputs, &FrameInputs::new(camera, frame_size)).unwrap();
         }

@@ -266,7 +266,8 @@ impl Denoiser {
         inputs: &Inputs<'_>,
         frame: &FrameInputs,
     ) -> Result<(), Error> {
-        inputs.check(self.core.plan().inputs(), self.core.settings(), frame.size)?;
+        let prev_size = self.core.prev_size(frame);
+        inputs.check(self.core.plan().inputs(), self.core.settings(), frame.size, prev_size)?;
         let schedule = self.core.next_frame(frame)?;
         if self.options.timestamps && self.timing.is_none() {
             let passes = self.core.plan().passes.iter().map(|pass| pass.name.clone()).collect();
@@ -286,8 +287,8 @@ impl Denoiser {
     /// [`limpid::Error::Order`], or one of the `Input` errors. Nothing was recorded then.
     pub fn encode_denoise(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &Inputs<'_>) -> Result<(), Error> {
         let schedule = self.core.started_frame()?.clone();
-        let size = UVec2::from_array(schedule.constants.size);
-        inputs.check(self.core.plan().inputs(), self.core.settings(), size)?;
+        let [size, prev_size] = [schedule.constants.size, schedule.constants.prev_size].map(UVec2::from_array);
+        inputs.check(self.core.plan().inputs(), self.core.settings(), size, prev_size)?;
         self.encode_stage(Stage::Denoise, encoder, inputs, &schedule);
         if let Some(timing) = &mut self.timing {
             timing.resolve(encoder);

@@ -1,8 +1,21 @@
 use glam::UVec2;
 use limpid::Settings;
+use limpid::resource::input_size;
 use limpid::settings::{Channel, NormalEncoding};
 
 use crate::Error;
+
+/// Last frame's G-buffer, encoded as this frame's and as large as that frame was. In the first frame, after a camera cut
+/// and after a resize it may be anything of any size.
+#[derive(Debug, Clone, Copy)]
+pub struct PrevGbuffer<'a> {
+    /// World-space normal.
+    pub normal: &'a wgpu::TextureView,
+    /// Roughness, in the channel that the settings name.
+    pub roughness: &'a wgpu::TextureView,
+    /// Depth.
+    pub depth: &'a wgpu::TextureView,
+}
 
 /// The caller's images of one frame. Encodings are set in [`Settings::conventions`]; any format whose texels
 /// read as float will do. The same view may serve several inputs.
@@ -22,6 +35,8 @@ pub struct Inputs<'a> {
     pub motion: &'a wgpu::TextureView,
     /// Equirectangular radiance with its mip chain. Only for `Fallback::Environment`.
     pub environment: Option<&'a wgpu::TextureView>,
+    /// Last frame's G-buffer. Only without the feature `gbuffer_copy`.
+    pub previous: Option<PrevGbuffer<'a>>,
 }
 
 impl<'a> Inputs<'a> {
@@ -34,6 +49,9 @@ impl<'a> Inputs<'a> {
             "depth" => Some(self.depth),
             "motion" => Some(self.motion),
             "environment" => self.environment,
+            "prev_normal" => self.previous.map(|previous| previous.normal),
+            "prev_roughness" => self.previous.map(|previous| previous.roughness),
+            "prev_depth" => self.previous.map(|previous| previous.depth),
             _ => None,
         }
     }
@@ -43,13 +61,13 @@ impl<'a> Inputs<'a> {
         &self,
         names: impl Iterator<Item = &'n str>,
         settings: &Settings,
-        frame_size: UVec2,
+        size: UVec2,
+        prev_size: UVec2,
     ) -> Result<(), Error> {
         for name in names {
             let (input, channels) = requirement(name, settings);
             let view = self.view(name).ok_or(Error::InputMissing { input })?;
-            let expected_size = if input == "environment" { UVec2::ONE } else { frame_size };
-            check_texture(input, view.texture(), channels, expected_size)?;
+            check_texture(input, view.texture(), channels, input_size(name, size, prev_size))?;
         }
         Ok(())
     }
@@ -57,20 +75,25 @@ impl<'a> Inputs<'a> {
 
 /// Field name of an input and how many channels it must have.
 fn requirement(name: &str, settings: &Settings) -> (&'static str, u8) {
+    let of_normal = match settings.conventions.normal {
+        NormalEncoding::Signed | NormalEncoding::Unsigned => 3,
+        NormalEncoding::Octahedral | NormalEncoding::OctahedralUnsigned => 2,
+    };
+    let of_roughness = match settings.conventions.roughness_channel {
+        Channel::Red => 1,
+        Channel::Green => 2,
+        Channel::Blue => 3,
+        Channel::Alpha => 4,
+    };
     match name {
         "radiance" => ("radiance", 4),
-        "normal" => match settings.conventions.normal {
-            NormalEncoding::Signed | NormalEncoding::Unsigned => ("normal", 3),
-            NormalEncoding::Octahedral | NormalEncoding::OctahedralUnsigned => ("normal", 2),
-        },
-        "roughness" => match settings.conventions.roughness_channel {
-            Channel::Red => ("roughness", 1),
-            Channel::Green => ("roughness", 2),
-            Channel::Blue => ("roughness", 3),
-            Channel::Alpha => ("roughness", 4),
-        },
+        "normal" => ("normal", of_normal),
+        "roughness" => ("roughness", of_roughness),
         "depth" => ("depth", 1),
         "motion" => ("motion", 2),
+        "prev_normal" => ("previous.normal", of_normal),
+        "prev_roughness" => ("previous.roughness", of_roughness),
+        "prev_depth" => ("previous.depth", 1),
         _ => ("environment", 3),
     }
 }

@@ -15,7 +15,7 @@
 //! // Every frame, after the G-buffer and the reflection rays.
 //! let (radiance, normal, roughness, depth, motion) = (view, view, view, view, view);
 //! let mut encoder = device.create_command_encoder(&Default::default());
-//! let inputs = Inputs { radiance, normal, roughness, depth, motion, environment: None };
+//! let inputs = Inputs { radiance, normal, roughness, depth, motion, environment: None, previous: None };
 //! denoiser.encode(queue, &mut encoder, &inputs, &FrameInputs::new(camera, size))?;
 //! let denoised: &wgpu::TextureView = denoiser.output();
 //! // ... shade with `denoised` in the same encoder or a later one, then
@@ -35,5 +35,5 @@ mod timing;
 
 pub use denoiser::{Denoiser, FRAMES_BEFORE_SUBMIT, Options, RayList};
 pub use error::Error;
-pub use inputs::Inputs;
+pub use inputs::{Inputs, PrevGbuffer};
 pub use timing::PassTime;

@@ -6,7 +6,7 @@ mod support;
 use glam::{Mat4, UVec2};
 use limpid::settings::{Channel, Fallback, NormalEncoding, RayList};
 use limpid::{FrameInputs, Settings};
-use limpid_wgpu::{Denoiser, Error, Inputs, Options};
+use limpid_wgpu::{Denoiser, Error, Inputs, Options, PrevGbuffer};
 use support::{Gpu, Images, Run, Scene, linear_settings, still_frame};
 use wgpu::TextureFormat::{self, R32Float, Rg16Float, Rg32Float, Rgba8Uint, Rgba16Float, Rgba32Float, Rgba32Sint};
 use wgpu::{TextureDescriptor, TextureUsages, TextureViewDescriptor};
@@ -127,6 +127,34 @@ fn what_an_input_must_have_depends_on_the_settings() {
     let red = Images { roughness: view(&gpu, SIZE, R32Float, |_| ()), ..enough.clone() };
     assert_says(&encode(&red).unwrap_err(), "InputFormat", &["`roughness`", "R32Float", "2 channels"]);
     encode(&enough).unwrap();
+}
+
+#[test]
+fn last_frames_gbuffer_is_as_large_as_that_frame() {
+    let Some(gpu) = Gpu::open() else { return };
+    let mut settings = linear_settings();
+    (settings.features.gbuffer_copy, settings.features.packed_guide) = (false, false);
+    let mut denoiser = Denoiser::new(&gpu.device, &settings, SIZE, Options::default()).unwrap();
+    let images = Scene::noisy_wall(SIZE, 0).upload(&gpu);
+    let smaller = SIZE - UVec2::X;
+    let mut encode = |previous, size| {
+        let inputs = Inputs { previous, ..images.inputs() };
+        denoiser.encode(&gpu.queue, &mut gpu.encoder(), &inputs, &still_frame(size))
+    };
+    assert_says(&encode(None, smaller).unwrap_err(), "InputMissing", &["`previous.normal`", "settings"]);
+    let single = view(&gpu, UVec2::ONE, Rgba32Float, |_| ());
+    let all = |view| PrevGbuffer { normal: view, roughness: view, depth: view };
+    // There is none yet.
+    encode(Some(all(&single)), smaller).unwrap();
+    let enough = view(&gpu, smaller, Rgba32Float, |_| ());
+    let parts = ["`previous.depth`", "[1, 1]", &format!("[{}, {}]", smaller.x, smaller.y)];
+    let thin = PrevGbuffer { depth: &single, ..all(&enough) };
+    assert_says(&encode(Some(thin), SIZE).unwrap_err(), "InputSize", &parts);
+    encode(Some(all(&enough)), SIZE).unwrap();
+    let red = view(&gpu, SIZE, R32Float, |_| ());
+    let thin = PrevGbuffer { normal: &red, ..all(&images.normal) };
+    let parts = ["`previous.normal`", "R32Float", "3 channels"];
+    assert_says(&encode(Some(thin), SIZE).unwrap_err(), "InputFormat", &parts);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use glam::UVec2;
 use half::f16;
 use limpid::{FrameInputs, Plan, Settings};
-use limpid_cpu::{Denoiser, Inputs, TexelFormat, Texture};
+use limpid_cpu::{Denoiser, Inputs, PrevGbuffer, TexelFormat, Texture};
 
 use super::{Backend, Denoised, ListedRay, Tracer, split, timed, to_half, trace_listed};
 use crate::sequence::Frame;
@@ -14,13 +14,15 @@ use crate::sequence::Frame;
 pub(crate) struct Cpu {
     description: String,
     denoiser: Denoiser,
+    /// Normal, roughness and depth of the last frame.
+    last: Option<[Texture; 3]>,
 }
 
 impl Cpu {
     pub(super) fn open(core: limpid::Denoiser) -> Result<Self> {
         let denoiser = Denoiser::with_core(core)?;
         let threads = std::thread::available_parallelism().map_or(1, usize::from);
-        Ok(Self { description: format!("the CPU ({threads} threads, no driver)"), denoiser })
+        Ok(Self { description: format!("the CPU ({threads} threads, no driver)"), denoiser, last: None })
     }
 
     /// The same, watching what happens to numbers.
@@ -48,6 +50,16 @@ fn radiance_texture(size: UVec2, radiance: &[[f32; 4]]) -> Texture {
     let word = |low: f32, high: f32| u32::from(to_half(low).to_bits()) | u32::from(to_half(high).to_bits()) << 16;
     texture.write(radiance.iter().flat_map(|&[r, g, b, a]| [word(r, g), word(b, a)]));
     texture
+}
+
+fn all_inputs<'a>(
+    radiance: &'a Texture,
+    motion: &'a Texture,
+    [normal, roughness, depth]: &'a [Texture; 3],
+    [prev_normal, prev_roughness, prev_depth]: &'a [Texture; 3],
+) -> Inputs<'a> {
+    let previous = Some(PrevGbuffer { normal: prev_normal, roughness: prev_roughness, depth: prev_depth });
+    Inputs { radiance, normal, roughness, depth, motion, environment: None, previous }
 }
 
 /// The first three channels and the fourth.
@@ -80,9 +92,10 @@ impl Backend for Cpu {
         let depth = texture(TexelFormat::R32Float, size, frame.depth.iter().copied());
         let motion = texture(TexelFormat::Rg32Float, size, frame.motion.iter().flatten().copied());
         let mut radiance = radiance_texture(size, &frame.radiance);
-        let (normal, roughness, depth, motion) = (&normal, &roughness, &depth, &motion);
-        let inputs = Inputs { radiance: &radiance, normal, roughness, depth, motion, environment: None };
+        let gbuffer = [normal, roughness, depth];
+        let previous = self.last.as_ref().unwrap_or(&gbuffer);
 
+        let inputs = all_inputs(&radiance, &motion, &gbuffer, previous);
         let (mut time, mut cpu_time) = (Duration::ZERO, Duration::ZERO);
         timed(&mut time, &mut cpu_time, || self.denoiser.run_classify(&inputs, &frame_inputs))?;
         let mut rays = frame.depth.iter().filter(|depth| **depth > 0.0).count() as u64;
@@ -95,8 +108,9 @@ impl Backend for Cpu {
             radiance = radiance_texture(size, &values);
             traced = Some(values);
         }
-        let inputs = Inputs { radiance: &radiance, normal, roughness, depth, motion, environment: None };
+        let inputs = all_inputs(&radiance, &motion, &gbuffer, previous);
         timed(&mut time, &mut cpu_time, || self.denoiser.run_denoise(&inputs))?;
+        self.last = Some(gbuffer);
         let (radiance, variance) = read_halves(self.denoiser.output(), size);
         let debug_view = self.denoiser.debug_view().map(|texture| read_halves(texture, size).0);
         Ok(Denoised { radiance, variance, debug_view, time, cpu_time, pass_times: Vec::new(), rays, traced })

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, anyhow};
 use glam::UVec2;
 use half::f16;
 use limpid::{FrameInputs, Plan};
-use limpid_wgpu::{Denoiser, Inputs, Options, PassTime};
+use limpid_wgpu::{Denoiser, Inputs, Options, PassTime, PrevGbuffer};
 
 use super::{Backend, Denoised, ListedRay, Tracer, split, timed, to_half, trace_listed};
 use crate::sequence::Frame;
@@ -18,13 +18,18 @@ struct Image {
     view: wgpu::TextureView,
 }
 
-/// The images of a frame.
-struct Images {
-    radiance: Image,
+struct Gbuffer {
     normal: Image,
     roughness: Image,
     depth: Image,
+}
+
+/// The images of a frame, and the G-buffer of the last.
+struct Images {
+    radiance: Image,
     motion: Image,
+    gbuffer: Gbuffer,
+    previous: Gbuffer,
 }
 
 pub(super) struct Gpu {
@@ -86,27 +91,44 @@ fn image(device: &wgpu::Device, name: &str, size: UVec2, format: wgpu::TextureFo
     Image { texture, view }
 }
 
-impl Images {
+impl Gbuffer {
     fn new(device: &wgpu::Device, size: UVec2) -> Self {
-        use wgpu::TextureFormat::{R32Float, Rg32Float, Rgba16Float, Rgba32Float};
+        use wgpu::TextureFormat::{R32Float, Rgba32Float};
         Self {
-            radiance: image(device, "radiance", size, Rgba16Float),
             normal: image(device, "normal", size, Rgba32Float),
             roughness: image(device, "roughness", size, R32Float),
             depth: image(device, "depth", size, R32Float),
+        }
+    }
+}
+
+impl Images {
+    fn new(device: &wgpu::Device, size: UVec2) -> Self {
+        use wgpu::TextureFormat::{Rg32Float, Rgba16Float};
+        Self {
+            radiance: image(device, "radiance", size, Rgba16Float),
             motion: image(device, "motion", size, Rg32Float),
+            gbuffer: Gbuffer::new(device, size),
+            previous: Gbuffer::new(device, size),
         }
     }
 
     fn inputs(&self) -> Inputs<'_> {
+        let Gbuffer { normal, roughness, depth } = &self.previous;
         Inputs {
             radiance: &self.radiance.view,
-            normal: &self.normal.view,
-            roughness: &self.roughness.view,
-            depth: &self.depth.view,
+            normal: &self.gbuffer.normal.view,
+            roughness: &self.gbuffer.roughness.view,
+            depth: &self.gbuffer.depth.view,
             motion: &self.motion.view,
             environment: None,
+            previous: Some(PrevGbuffer { normal: &normal.view, roughness: &roughness.view, depth: &depth.view }),
         }
+    }
+
+    /// This frame's G-buffer is last frame's from now on.
+    fn advance(&mut self) {
+        std::mem::swap(&mut self.gbuffer, &mut self.previous);
     }
 }
 
@@ -141,9 +163,9 @@ impl Gpu {
 
     fn upload_gbuffer(&self, frame: &Frame) {
         let normals: Vec<[f32; 4]> = frame.normal.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect();
-        self.upload(&self.images.normal, frame.size, &normals);
-        self.upload(&self.images.roughness, frame.size, &frame.roughness);
-        self.upload(&self.images.depth, frame.size, &frame.depth);
+        self.upload(&self.images.gbuffer.normal, frame.size, &normals);
+        self.upload(&self.images.gbuffer.roughness, frame.size, &frame.roughness);
+        self.upload(&self.images.gbuffer.depth, frame.size, &frame.depth);
         self.upload(&self.images.motion, frame.size, &frame.motion);
     }
 
@@ -247,6 +269,7 @@ impl Backend for Gpu {
         inputs.reset = frame.reset;
         inputs.frame_seconds = frame.seconds;
         inputs.exposure = exposure;
+        self.images.advance();
         self.upload_gbuffer(frame);
         if tracer.is_none() {
             self.upload_radiance(frame.size, &frame.radiance);

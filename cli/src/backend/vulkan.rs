@@ -16,6 +16,8 @@ use crate::sequence::Frame;
 
 pub(super) struct Vulkan {
     description: String,
+    /// Normal, roughness and depth of the last frame. Before the context, as the session is.
+    last: Option<[UploadedImage; 3]>,
     session: Session,
     context: Rc<Context>,
 }
@@ -30,7 +32,7 @@ impl Vulkan {
         };
         let description = format!("{} through ash", context.name());
         let session = Session::new(&context, core, options)?;
-        Ok(Self { description, session, context })
+        Ok(Self { description, last: None, session, context })
     }
 }
 
@@ -84,8 +86,11 @@ impl Backend for Vulkan {
         let depth = upload(context, Format::R32_SFLOAT, size, &frame.depth)?;
         let motion = upload(context, Format::R32G32_SFLOAT, size, &frame.motion)?;
         let radiance = upload(context, Format::R16G16B16A16_SFLOAT, size, &half_texels(&frame.radiance))?;
-        let (normal, roughness, depth, motion) = (&normal, &roughness, &depth, &motion);
-        let inputs = UploadedInputs { radiance: &radiance, normal, roughness, depth, motion, environment: None };
+        let gbuffer = [normal, roughness, depth];
+        let previous = Some(self.last.as_ref().unwrap_or(&gbuffer).each_ref());
+        let [normal, roughness, depth] = &gbuffer;
+        let (radiance, motion) = (&radiance, &motion);
+        let inputs = UploadedInputs { radiance, normal, roughness, depth, motion, environment: None, previous };
         let mut rays = frame.depth.iter().filter(|depth| **depth > 0.0).count() as u64;
         let (mut time, mut cpu_time) = (Duration::ZERO, Duration::ZERO);
         let mut traced = None;
@@ -100,6 +105,7 @@ impl Backend for Vulkan {
         } else {
             timed(&mut time, &mut cpu_time, || session.run(&inputs, &frame_inputs))?;
         }
+        self.last = Some(gbuffer);
         let pass_times = session.denoiser().read_times()?.unwrap_or_default();
         let pass_times = pass_times.into_iter().map(|time| (time.pass, time.duration)).collect();
         let (radiance, variance) = read_halves(context, &session.denoiser().output(), size)?;

@@ -32,7 +32,7 @@ pub struct Counts {
 /// Bytes a texel of the images that this command supplies.
 fn input_bytes(name: &str) -> f64 {
     match name {
-        "normal" => 16.0,
+        "normal" | "prev_normal" => 16.0,
         "radiance" | "motion" | "environment" => 8.0,
         _ => 4.0,
     }

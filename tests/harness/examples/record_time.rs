@@ -35,6 +35,7 @@ fn with_ash(settings: &Settings, frame: &FrameInputs) -> Result<(f64, limpid_ash
         depth: single.input(),
         motion: wide.input(),
         environment: None,
+        previous: None,
     };
     let options = limpid_ash::Options { synchronization: context.synchronization(), ..limpid_ash::Options::default() };
     // SAFETY: the context's handles belong together and outlive the denoiser.
@@ -76,6 +77,7 @@ fn with_wgpu(settings: &Settings, frame: &FrameInputs) -> Result<f64, Failure> {
         depth: &view,
         motion: &view,
         environment: None,
+        previous: None,
     };
     let mut denoiser = limpid_wgpu::Denoiser::new(&device, settings, SIZE, limpid_wgpu::Options::default())?;
     let mut times = Vec::new();

@@ -49,9 +49,13 @@ pub fn half_steps(a: u32, b: u32) -> u32 {
     ordered(a & 0xffff).abs_diff(ordered(b & 0xffff))
 }
 
-/// Whether a pixel is denoised: the guide's depth is negative where it is left out.
+/// Whether a pixel is denoised: the guide's depth is negative where it is left out. Without a guide, whether its tile is
+/// listed: what is left out in those has no history.
 fn is_denoised(snapshot: &Snapshot, pixel: usize) -> bool {
-    f32::from_bits(snapshot.0["guide"][2 * pixel]) > 0.0
+    match snapshot.0.get("guide") {
+        Some(guide) => f32::from_bits(guide[2 * pixel]) > 0.0,
+        None => snapshot.0["listed"][pixel] != 0,
+    }
 }
 
 /// Where a pipeline keeps what it accumulated: radiance in three half floats, in the upper half of the second word

@@ -87,8 +87,23 @@ impl Images {
         Self { size, pixels: positions.map(pixel).collect() }
     }
 
-    /// The images of all inputs, environment included.
-    pub fn images(&self) -> Vec<Image> {
+    /// The images of all inputs of a frame, environment and last frame's G-buffer included.
+    pub fn images(&self, previous: &Self) -> Vec<Image> {
+        let mut images = self.own_images();
+        let renamed = |image: Image| {
+            let name = match image.name {
+                "normal" => "prev_normal",
+                "roughness" => "prev_roughness",
+                "depth" => "prev_depth",
+                _ => return None,
+            };
+            Some(Image { name, ..image })
+        };
+        images.extend(previous.own_images().into_iter().filter_map(renamed));
+        images
+    }
+
+    fn own_images(&self) -> Vec<Image> {
         let image = |name, format, words| Image { name, format, size: self.size, words };
         let pixels = || self.pixels.iter();
         let normal = |p: &Pixel| [p.normal[0], p.normal[1], p.normal[2], 0.0].map(f32::to_bits);
@@ -175,6 +190,12 @@ impl Case {
         limpid::Denoiser::new(&self.settings, self.size).unwrap()
     }
 
+    /// The images of all inputs of a frame. The first one is given its own G-buffer as last frame's: history that should
+    /// not be there would be found.
+    pub fn images(&self, index: usize) -> Vec<Image> {
+        self.steps[index].images.images(&self.steps[index.saturating_sub(1)].images)
+    }
+
     /// What an executor leaves in memory after each frame.
     pub fn run(&self, executor: &mut dyn Executor) -> Vec<Snapshot> {
         self.run_plan(executor, self.core())
@@ -183,14 +204,20 @@ impl Case {
     /// The same for a plan that is not the settings' own.
     pub fn run_plan(&self, executor: &mut dyn Executor, core: limpid::Denoiser) -> Vec<Snapshot> {
         executor.start(core);
-        let frame = |step: &Step| {
+        let mut size = self.size;
+        let frame = |(index, step): (usize, &Step)| {
             match &step.change {
                 Change::None => {}
-                Change::Resize(size) => executor.resize(*size),
+                Change::Resize(to) => {
+                    size = *to;
+                    executor.resize(size);
+                }
                 Change::Settings(settings) => executor.set_settings(settings),
             }
-            executor.frame(&step.images.images(), &step.frame)
+            let mut snapshot = executor.frame(&self.images(index), &step.frame);
+            snapshot.note_listed(size, step.frame.size);
+            snapshot
         };
-        self.steps.iter().map(frame).collect()
+        self.steps.iter().enumerate().map(frame).collect()
     }
 }

@@ -1,8 +1,9 @@
 use std::collections::BTreeMap;
 
+use glam::UVec2;
 use half::f16;
 use limpid::Plan;
-use limpid::resource::{Copy, Kind, Resource};
+use limpid::resource::{Copy, Extent, Kind, Resource, TILE_SIZE};
 
 /// All resources of limpid after a frame, as words, by name and copy.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -60,6 +61,17 @@ impl Snapshot {
             list[..rays.min(count)].sort_unstable();
             list[rays.min(count)..].fill(0);
         }
+    }
+
+    /// Where there is no guide to tell which pixels were denoised, notes those of listed tiles as `listed`. `size` is that of
+    /// the textures, `frame` that of the frame.
+    pub(crate) fn note_listed(&mut self, size: UVec2, frame: UVec2) {
+        let Some(flags) = self.0.get("tile_flags").filter(|_| !self.0.contains_key("guide")) else { return };
+        let row = Extent::Tile.of(size).x;
+        let positions = (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y)));
+        let flag = |p: UVec2| flags[(p.y / TILE_SIZE * row + p.x / TILE_SIZE) as usize];
+        let listed = positions.map(|p| if p.cmplt(frame).all() { flag(p) } else { 0 }).collect();
+        self.0.insert("listed".to_owned(), listed);
     }
 
     /// Whether every half float of the output is a finite number.

@@ -300,13 +300,14 @@ fn number_value(number: &'static Number) -> impl Strategy<Value = f32> {
 pub fn any_features() -> impl Strategy<Value = Features> {
     let roughness = prop::option::of(select(&[0.0f32, 0.01, 0.447_213_6, 1.0][..]));
     let near_taps = select(&[0u32, 1, 4, 12][..]);
-    (prop::array::uniform10(any::<bool>()), near_taps, roughness).prop_map(|(on, near_taps, constant_roughness)| {
+    (prop::array::uniform13(any::<bool>()), near_taps, roughness).prop_map(|(on, near_taps, constant_roughness)| {
         let mut features = Features::default();
         // One of the two has to be on.
         (features.mirror_parallax, features.surface_motion) = (on[0] || !on[1], on[1]);
         (features.history_search, features.edge_repair, features.spatial_filter) = (on[2], on[3], on[4]);
         (features.history_clip, features.average_mixing) = (on[5], on[6]);
         (features.light_change, features.outlier_spread, features.wide_filter) = (on[7], on[8], on[9]);
+        (features.gbuffer_copy, features.packed_guide, features.block_statistics) = (on[10], on[11], on[12]);
         (features.near_taps, features.constant_roughness) = (near_taps, constant_roughness);
         features
     })

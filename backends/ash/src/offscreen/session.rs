@@ -4,7 +4,7 @@ use limpid::FrameInputs;
 
 use super::context::{Context, OffscreenError};
 use super::image::UploadedImage;
-use crate::{Denoiser, Inputs, Options};
+use crate::{Denoiser, Inputs, Options, PrevGbuffer};
 
 /// The images of a frame.
 #[derive(Clone, Copy)]
@@ -21,6 +21,8 @@ pub struct UploadedInputs<'a> {
     pub motion: &'a UploadedImage,
     /// Equirectangular radiance. Only for `Fallback::Environment`.
     pub environment: Option<&'a UploadedImage>,
+    /// Last frame's normal, roughness and depth. Only without the feature `gbuffer_copy`.
+    pub previous: Option<[&'a UploadedImage; 3]>,
 }
 
 impl UploadedInputs<'_> {
@@ -32,6 +34,10 @@ impl UploadedInputs<'_> {
             depth: self.depth.input(),
             motion: self.motion.input(),
             environment: self.environment.map(UploadedImage::input),
+            previous: self.previous.map(|images| {
+                let [normal, roughness, depth] = images.map(UploadedImage::input);
+                PrevGbuffer { normal, roughness, depth }
+            }),
         }
     }
 }

@@ -295,6 +295,7 @@ impl Images {
             depth: &self.depth,
             motion: &self.motion,
             environment: self.environment.as_ref(),
+            previous: None,
         }
     }
 }

@@ -120,6 +120,7 @@ impl Executor for Ash {
             depth: find("depth"),
             motion: find("motion"),
             environment: Some(find("environment")),
+            previous: Some(["prev_normal", "prev_roughness", "prev_depth"].map(find)),
         };
         session.run(&inputs, frame).unwrap();
         let denoiser = session.denoiser();

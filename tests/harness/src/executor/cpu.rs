@@ -1,6 +1,6 @@
 use glam::UVec2;
 use limpid::{FrameInputs, Settings};
-use limpid_cpu::{Denoiser, Inputs, Texture};
+use limpid_cpu::{Denoiser, Inputs, PrevGbuffer, Texture};
 
 use super::Executor;
 use crate::{Image, Snapshot, TexelFormat};
@@ -97,6 +97,11 @@ impl Executor for Cpu {
             depth: find("depth"),
             motion: find("motion"),
             environment: Some(find("environment")),
+            previous: Some(PrevGbuffer {
+                normal: find("prev_normal"),
+                roughness: find("prev_roughness"),
+                depth: find("prev_depth"),
+            }),
         };
         let denoiser = self.denoiser.as_mut().unwrap();
         if let Some(word) = self.overwritten {

@@ -2,7 +2,7 @@ use std::sync::{Arc, Mutex, mpsc};
 
 use glam::UVec2;
 use limpid::{FrameInputs, Settings};
-use limpid_wgpu::{Denoiser, Inputs, Options};
+use limpid_wgpu::{Denoiser, Inputs, Options, PrevGbuffer};
 
 use super::Executor;
 use crate::{Image, Snapshot, TexelFormat};
@@ -121,6 +121,11 @@ impl Executor for Wgpu {
             depth: find("depth"),
             motion: find("motion"),
             environment: Some(find("environment")),
+            previous: Some(PrevGbuffer {
+                normal: find("prev_normal"),
+                roughness: find("prev_roughness"),
+                depth: find("prev_depth"),
+            }),
         };
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let mut denoiser = self.denoiser.take().unwrap();

@@ -1,0 +1,115 @@
+// The G-buffer of this frame and of the last, as the caller has them, and what this frame's says about a pixel: packed
+// by `classify`, or decoded anew by every pass that asks.
+
+import package::shared::frame;
+import package::shared::packing;
+
+// 0: xyz in -1..1, 1: xyz in 0..1, 2: octahedral in -1..1, 3: octahedral in 0..1.
+override NORMAL_ENCODING: u32 = 0u;
+// Channel of the roughness texture.
+override ROUGHNESS_CHANNEL: u32 = 0u;
+// The roughness texture holds GGX alpha, not perceptual roughness.
+override ROUGHNESS_IS_ALPHA: bool = false;
+// All surfaces have the roughness in the constants; there is no texture of it.
+override ROUGHNESS_IS_CONSTANT: bool = false;
+// `classify` keeps what it decodes in a texture.
+override GUIDE_IS_PACKED: bool = true;
+// limpid keeps last frame's G-buffer; else the caller supplies it.
+override GBUFFER_IS_COPIED: bool = true;
+
+@group(0) @binding(2) var in_normal: texture_2d<f32>;
+@group(0) @binding(3) var in_roughness: texture_2d<f32>;
+@group(0) @binding(4) var in_depth: texture_2d<f32>;
+@group(0) @binding(8) var in_prev_normal: texture_2d<f32>;
+@group(0) @binding(9) var in_prev_roughness: texture_2d<f32>;
+@group(0) @binding(10) var in_prev_depth: texture_2d<f32>;
+
+@group(1) @binding(12) var in_guide: texture_2d<u32>;
+
+fn decode_normal(texel: vec4<f32>) -> vec3<f32> {
+    if NORMAL_ENCODING == 0u {
+        return texel.xyz;
+    }
+    if NORMAL_ENCODING == 1u {
+        return texel.xyz * 2.0 - 1.0;
+    }
+    if NORMAL_ENCODING == 2u {
+        return oct_decode(texel.xy);
+    }
+    return oct_decode(texel.xy * 2.0 - 1.0);
+}
+
+// How the depths that the caller supplies become linear.
+struct DepthEncoding {
+    from_device: vec4<f32>,
+    sky: vec2<f32>,
+}
+
+fn linear_depth(device: f32, encoding: DepthEncoding) -> f32 {
+    let c = encoding.from_device;
+    let depth = abs((c.x + c.y * device) / (c.z + c.w * device));
+    let is_surface = is_finite(device) && device > encoding.sky.x && device < encoding.sky.y
+        && is_finite(depth) && depth > 0.0 && depth < SKY_DEPTH;
+    return select(SKY_DEPTH, depth, is_surface);
+}
+
+// Texels that hold no direction or no roughness make their pixel one without a surface.
+fn guide_of(normal_texel: vec4<f32>, stored_roughness: f32, depth: f32) -> Guide {
+    let normal = decode_normal(normal_texel);
+    let squared_length = dot(normal, normal);
+    let usable = is_finite(squared_length) && squared_length > 1e-12 && is_finite(stored_roughness);
+    var guide: Guide;
+    guide.normal = select(vec3<f32>(0.0, 0.0, 1.0), normal * inverseSqrt(max(squared_length, 1e-12)), usable);
+    guide.roughness = select(1.0, saturate(stored_roughness), is_finite(stored_roughness));
+    if ROUGHNESS_IS_ALPHA {
+        guide.roughness = sqrt(guide.roughness);
+    }
+    guide.roughness = quantized_roughness(guide.roughness);
+    guide.depth = select(SKY_DEPTH, depth, usable);
+    guide.denoised = guide.depth < SKY_DEPTH && guide.roughness <= frame.roughness_threshold;
+    return guide;
+}
+
+fn depth_encoding() -> DepthEncoding {
+    return DepthEncoding(frame.depth_from_device, frame.sky_depth);
+}
+
+fn decode_depth(pixel: vec2<u32>, encoding: DepthEncoding) -> f32 {
+    return linear_depth(textureLoad(in_depth, pixel, 0).x, encoding);
+}
+
+// This frame's, from the caller's images.
+fn decode_guide(pixel: vec2<u32>, encoding: DepthEncoding) -> Guide {
+    var roughness = frame.constant_roughness;
+    if !ROUGHNESS_IS_CONSTANT {
+        roughness = textureLoad(in_roughness, pixel, 0)[ROUGHNESS_CHANNEL];
+    }
+    return guide_of(textureLoad(in_normal, pixel, 0), roughness, decode_depth(pixel, encoding));
+}
+
+// Last frame's, from the caller's images.
+fn decode_prev_guide(texel: vec2<i32>) -> Guide {
+    var roughness = frame.constant_roughness;
+    if !ROUGHNESS_IS_CONSTANT {
+        roughness = textureLoad(in_prev_roughness, texel, 0)[ROUGHNESS_CHANNEL];
+    }
+    let encoding = DepthEncoding(frame.prev_depth_from_device, frame.sky_depth);
+    let depth = linear_depth(textureLoad(in_prev_depth, texel, 0).x, encoding);
+    return guide_of(textureLoad(in_prev_normal, texel, 0), roughness, depth);
+}
+
+// This frame's, from wherever it is.
+fn load_guide(pixel: vec2<u32>) -> Guide {
+    if GUIDE_IS_PACKED {
+        return unpack_guide(textureLoad(in_guide, pixel, 0).xy);
+    }
+    return decode_guide(pixel, depth_encoding());
+}
+
+// Whether this frame's pixel is denoised.
+fn is_denoised(pixel: vec2<u32>) -> bool {
+    if GUIDE_IS_PACKED {
+        return packed_guide_is_denoised(textureLoad(in_guide, pixel, 0).xy);
+    }
+    return decode_guide(pixel, depth_encoding()).denoised;
+}
