@@ -105,6 +105,7 @@ fn inputs_that_do_not_fit_are_refused_and_nothing_is_recorded() {
         roughness: single.input(),
         depth: single.input(),
         motion: wide.input(),
+        hit_motion: None,
         environment: None,
     };
     let mut settings = Settings::default();
@@ -156,6 +157,7 @@ fn several_denoisers_live_on_one_device() {
         roughness: &image,
         depth: &image,
         motion: &image,
+        hit_motion: None,
         environment: None,
     };
     for _ in 0..2 {

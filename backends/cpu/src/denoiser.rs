@@ -22,6 +22,8 @@ pub struct Inputs<'a> {
     pub depth: &'a Texture,
     /// Motion vectors in the first two channels.
     pub motion: &'a Texture,
+    /// World-space motion of what was hit, in `rgb`. Only for the feature `hit_motion`.
+    pub hit_motion: Option<&'a Texture>,
     /// Equirectangular radiance with its mip chain. Only for `Fallback::Environment`.
     pub environment: Option<&'a Texture>,
 }
@@ -34,6 +36,7 @@ impl<'a> Inputs<'a> {
             "roughness" => Some(self.roughness),
             "depth" => Some(self.depth),
             "motion" => Some(self.motion),
+            "hit_motion" => self.hit_motion,
             "environment" => self.environment,
             _ => None,
         }

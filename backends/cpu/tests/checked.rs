@@ -142,6 +142,7 @@ fn kernels_do_nothing_of_the_kind() {
                 roughness: &roughness,
                 depth: &depth,
                 motion: &motion,
+                hit_motion: Some(&hit_motion),
                 environment: Some(&environment),
             };
             denoiser.denoise(&inputs, &FrameInputs::new(camera, frame_size)).unwrap();

@@ -20,6 +20,8 @@ pub struct Inputs<'a> {
     pub depth: &'a wgpu::TextureView,
     /// Motion vectors in `rg`.
     pub motion: &'a wgpu::TextureView,
+    /// World-space motion of what was hit, in `rgb`. Only for the feature `hit_motion`.
+    pub hit_motion: Option<&'a wgpu::TextureView>,
     /// Equirectangular radiance with its mip chain. Only for `Fallback::Environment`.
     pub environment: Option<&'a wgpu::TextureView>,
 }
@@ -33,6 +35,7 @@ impl<'a> Inputs<'a> {
             "roughness" => Some(self.roughness),
             "depth" => Some(self.depth),
             "motion" => Some(self.motion),
+            "hit_motion" => self.hit_motion,
             "environment" => self.environment,
             _ => None,
         }
@@ -71,6 +74,7 @@ fn requirement(name: &str, settings: &Settings) -> (&'static str, u8) {
         },
         "depth" => ("depth", 1),
         "motion" => ("motion", 2),
+        "hit_motion" => ("hit_motion", 3),
         _ => ("environment", 3),
     }
 }

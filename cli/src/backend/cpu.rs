@@ -78,9 +78,12 @@ impl Backend for Cpu {
         let roughness = texture(TexelFormat::R32Float, size, frame.roughness.iter().copied());
         let depth = texture(TexelFormat::R32Float, size, frame.depth.iter().copied());
         let motion = texture(TexelFormat::Rg32Float, size, frame.motion.iter().flatten().copied());
+        let hit_motion = super::hit_motion(self.plan(), frame)?;
+        let hit_motion = hit_motion.map(|m| texture(TexelFormat::Rgba32Float, size, m.into_iter().flatten()));
         let mut radiance = radiance_texture(size, &frame.radiance);
         let (normal, roughness, depth, motion) = (&normal, &roughness, &depth, &motion);
-        let inputs = Inputs { radiance: &radiance, normal, roughness, depth, motion, environment: None };
+        let hit_motion = hit_motion.as_ref();
+        let inputs = Inputs { radiance: &radiance, normal, roughness, depth, motion, hit_motion, environment: None };
 
         let (mut time, mut cpu_time) = (Duration::ZERO, Duration::ZERO);
         timed(&mut time, &mut cpu_time, || self.denoiser.run_classify(&inputs, &frame_inputs))?;
@@ -94,7 +97,7 @@ impl Backend for Cpu {
             radiance = radiance_texture(size, &values);
             traced = Some(values);
         }
-        let inputs = Inputs { radiance: &radiance, normal, roughness, depth, motion, environment: None };
+        let inputs = Inputs { radiance: &radiance, normal, roughness, depth, motion, hit_motion, environment: None };
         timed(&mut time, &mut cpu_time, || self.denoiser.run_denoise(&inputs))?;
         let (radiance, variance) = read_halves(self.denoiser.output(), size);
         let debug_view = self.denoiser.debug_view().map(|texture| read_halves(texture, size).0);

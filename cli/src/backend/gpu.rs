@@ -25,6 +25,7 @@ struct Images {
     roughness: Image,
     depth: Image,
     motion: Image,
+    hit_motion: Image,
 }
 
 pub(super) struct Gpu {
@@ -95,6 +96,7 @@ impl Images {
             roughness: image(device, "roughness", size, R32Float),
             depth: image(device, "depth", size, R32Float),
             motion: image(device, "motion", size, Rg32Float),
+            hit_motion: image(device, "hit motion", size, Rgba32Float),
         }
     }
 
@@ -105,6 +107,7 @@ impl Images {
             roughness: &self.roughness.view,
             depth: &self.depth.view,
             motion: &self.motion.view,
+            hit_motion: Some(&self.hit_motion.view),
             environment: None,
         }
     }
@@ -139,12 +142,16 @@ impl Gpu {
         self.upload(&self.images.radiance, size, &halves);
     }
 
-    fn upload_gbuffer(&self, frame: &Frame) {
+    fn upload_gbuffer(&self, frame: &Frame) -> Result<()> {
         let normals: Vec<[f32; 4]> = frame.normal.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect();
         self.upload(&self.images.normal, frame.size, &normals);
         self.upload(&self.images.roughness, frame.size, &frame.roughness);
         self.upload(&self.images.depth, frame.size, &frame.depth);
         self.upload(&self.images.motion, frame.size, &frame.motion);
+        if let Some(motion) = super::hit_motion(self.denoiser.plan(), frame)? {
+            self.upload(&self.images.hit_motion, frame.size, &motion);
+        }
+        Ok(())
     }
 
     fn readback_buffer(&self, size: u64) -> wgpu::Buffer {
@@ -246,7 +253,7 @@ impl Backend for Gpu {
         let mut inputs = FrameInputs::new(frame.camera, frame.size);
         inputs.reset = frame.reset;
         inputs.exposure = exposure;
-        self.upload_gbuffer(frame);
+        self.upload_gbuffer(frame)?;
         if tracer.is_none() {
             self.upload_radiance(frame.size, &frame.radiance);
         }

@@ -31,7 +31,7 @@ pub(super) struct Denoise {
     #[command(flatten)]
     debug_view: DebugViewOptions,
     /// Channel of the EXR files for an input, such as depth=ViewLayer.Depth.Z. Inputs are radiance,
-    /// hit_distance, normal, roughness, depth, motion and reference; a name stands for all channels that
+    /// hit_distance, normal, roughness, depth, motion, hit_motion and reference; a name stands for all channels that
     /// begin with it, a comma separates exact names. Can be given more than once.
     #[arg(long, value_name = "INPUT=NAME")]
     channel: Vec<String>,

@@ -34,6 +34,7 @@ fn with_ash(settings: &Settings, frame: &FrameInputs) -> Result<(f64, limpid_ash
         roughness: single.input(),
         depth: single.input(),
         motion: wide.input(),
+        hit_motion: None,
         environment: None,
     };
     let options = limpid_ash::Options { synchronization: context.synchronization(), ..limpid_ash::Options::default() };
@@ -75,6 +76,7 @@ fn with_wgpu(settings: &Settings, frame: &FrameInputs) -> Result<f64, Failure> {
         roughness: &view,
         depth: &view,
         motion: &view,
+        hit_motion: None,
         environment: None,
     };
     let mut denoiser = limpid_wgpu::Denoiser::new(&device, settings, SIZE, limpid_wgpu::Options::default())?;

@@ -294,6 +294,7 @@ impl Images {
             roughness: &self.roughness,
             depth: &self.depth,
             motion: &self.motion,
+            hit_motion: self.hit_motion.as_ref(),
             environment: self.environment.as_ref(),
         }
     }
@@ -350,6 +351,7 @@ impl Scene {
             roughness: gpu.upload(self.size, Rgba32Float, &each(&self.pixels, roughness)),
             depth: gpu.upload(self.size, R32Float, &each(&self.pixels, |p| p.depth)),
             motion: gpu.upload(self.size, Rg32Float, &each(&self.pixels, |p| p.motion.to_array())),
+            hit_motion: None,
             environment: None,
         }
     }

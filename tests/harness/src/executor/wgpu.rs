@@ -120,6 +120,7 @@ impl Executor for Wgpu {
             roughness: find("roughness"),
             depth: find("depth"),
             motion: find("motion"),
+            hit_motion: Some(find("hit_motion")),
             environment: Some(find("environment")),
         };
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
