@@ -279,7 +279,7 @@ fn candidates_of(pixel: vec2<u32>, subject: Subject) -> Candidates {
         let distance = hit_distance_of(subject.share, camera_distance_of(subject.position)) * dominant;
         var image = subject.position + view_direction(subject.position) * distance;
         if HIT_MOTION {
-            image -= image_motion(pixel, subject.guide.normal, dominant) * (1.0 - smoothstep(0.03, 0.2, r));
+            image -= image_motion(pixel, subject.guide.normal, dominant);
         }
         found.reflection_uv = prev_uv_of(image) + (found.surface_uv - static_uv);
         let tolerance = Tolerance(select(0.015, 0.1, moves), select(0.98, 0.95, r >= 0.3), share_tolerance);

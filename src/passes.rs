@@ -262,7 +262,14 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         is_needed: always,
         stage: Stage::Denoise,
         grid: GridTemplate::List(0),
-        overrides: &["MIRROR_PARALLAX", "SURFACE_MOTION", "HIT_MOTION", "HISTORY_CLIP", "LIGHT_CHANGE", "OUTLIER_SPREAD"],
+        overrides: &[
+            "MIRROR_PARALLAX",
+            "SURFACE_MOTION",
+            "HIT_MOTION",
+            "HISTORY_CLIP",
+            "LIGHT_CHANGE",
+            "OUTLIER_SPREAD",
+        ],
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),

@@ -71,6 +71,8 @@ proptest! {
         let features = &settings.features;
         prop_assert_eq!(plan.inputs().any(|i| i == "motion"), features.surface_motion);
         let is_published = settings.pipeline == Pipeline::Published;
+        let moves_hits = features.hit_motion && features.mirror_parallax && !is_published;
+        prop_assert_eq!(plan.inputs().any(|i| i == "hit_motion"), moves_hits);
         let has_pass = |kernel: &str| plan.passes.iter().any(|pass| pass.kernel == kernel);
         prop_assert_eq!(plan.inputs().any(|i| i == "roughness"), features.constant_roughness.is_none());
         prop_assert_eq!(has_pass("prefilter"), is_published && features.spatial_filter);

@@ -132,6 +132,10 @@ fn inputs_that_do_not_fit_are_refused_and_nothing_is_recorded() {
     // After all that the denoiser works.
     record(&mut denoiser, &good, &frame(SIZE)).unwrap();
 
+    settings.features.hit_motion = true;
+    let error = record(&mut new(&settings), &good, &frame(SIZE)).unwrap_err();
+    assert!(matches!(error, OffscreenError::Denoiser(Error::InputMissing { input: "hit_motion" })), "{error}");
+    let good = Inputs { hit_motion: Some(wide.input()), ..good };
     settings.coverage.fallback = Fallback::Environment;
     let error = record(&mut new(&settings), &good, &frame(SIZE)).unwrap_err();
     assert!(matches!(error, OffscreenError::Denoiser(Error::InputMissing { input: "environment" })), "{error}");

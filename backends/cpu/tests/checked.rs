@@ -111,6 +111,7 @@ fn kernels_do_nothing_of_the_kind() {
         let mut settings = Settings::default();
         settings.pipeline = pipeline;
         settings.conventions.depth = limpid::settings::DepthEncoding::Linear;
+        settings.features.hit_motion = true;
         settings.coverage.roughness_threshold = 0.7;
         settings.coverage.fallback = fallback;
         settings.coverage.ray_list = rays.map(|rays| {
@@ -134,6 +135,8 @@ fn kernels_do_nothing_of_the_kind() {
             let roughness = image(TexelFormat::R32Float, size, |p| vec![seed(p / 8, 5)]);
             let depth = image(TexelFormat::R32Float, size, |p| vec![depth(p)]);
             let motion = image(TexelFormat::Rg32Float, size, |p| vec![seed(p, 6) * 0.3 - 0.15, seed(p, 7) * 3.0 - 1.5]);
+            let hit_motion =
+                image(TexelFormat::Rgba32Float, size, |p| vec![seed(p, 8) - 0.5, seed(p, 9) * 1e30, 0.0, 0.0]);
             // The last frame uses a part of the textures.
             let frame_size = if number == 3 { UVec2::new(33, 20) } else { size };
             let inputs = Inputs {

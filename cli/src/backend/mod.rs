@@ -63,13 +63,10 @@ fn hit_motion(plan: &Plan, frame: &Frame) -> Result<Option<Vec<[f32; 4]>>> {
     if !plan.inputs().any(|input| input == "hit_motion") {
         return Ok(None);
     }
-    let motion = frame.hit_motion.as_ref().with_context(|| {
-        format!(
-            "frame {} has no hit_motion, which the feature hit_motion needs: expected channels hit_motion.X, .Y and .Z, \
-             or other ones named with --channel hit_motion=NAME",
-            frame.number
-        )
-    })?;
+    let motion = frame.hit_motion.as_ref().context(
+        "there is no hit motion, which the feature hit_motion needs: expected channels hit_motion.X, .Y and .Z, or other \
+         ones named with --channel hit_motion=NAME",
+    )?;
     Ok(Some(motion.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect()))
 }
 

@@ -86,7 +86,15 @@ impl Backend for Vulkan {
         let hit_motion = super::hit_motion(session.denoiser().plan(), frame)?;
         let hit_motion = hit_motion.map(|m| upload(context, Format::R32G32B32A32_SFLOAT, size, &m)).transpose()?;
         let (normal, roughness, depth, motion) = (&normal, &roughness, &depth, &motion);
-        let inputs = UploadedInputs { radiance: &radiance, normal, roughness, depth, motion, hit_motion: hit_motion.as_ref(), environment: None };
+        let inputs = UploadedInputs {
+            radiance: &radiance,
+            normal,
+            roughness,
+            depth,
+            motion,
+            hit_motion: hit_motion.as_ref(),
+            environment: None,
+        };
         let mut rays = frame.depth.iter().filter(|depth| **depth > 0.0).count() as u64;
         let (mut time, mut cpu_time) = (Duration::ZERO, Duration::ZERO);
         let mut traced = None;

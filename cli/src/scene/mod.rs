@@ -103,14 +103,13 @@ impl Scene {
         image
     }
 
-    /// G-buffer, and in scenes with moving objects the motion of what reflected rays hit: the radiance is zero and there
+    /// G-buffer and the motion of what reflected rays hit: the radiance is zero and there
     /// is no reference.
     pub fn gbuffer(&self, frame: u32, size: UVec2) -> Frame {
         let cut = frame == 0 || self.shots.iter().any(|shot| shot.first == frame);
         let previous = (!cut).then(|| World::new(self, frame - 1));
         let mut image = gbuffer::gbuffer(&World::new(self, frame), previous.as_ref(), frame, size);
-        let moves = self.objects.iter().any(|object| object.movement != Movement::default());
-        image.hit_motion = moves.then(|| self.hit_motion(frame, &image));
+        image.hit_motion = Some(self.hit_motion(frame, &image));
         image
     }
 
@@ -120,6 +119,9 @@ impl Scene {
         let (world, view) = (World::new(self, frame), View::new(&gbuffer.camera));
         let previous = World::new(self, if gbuffer.reset { frame } else { frame - 1 });
         let pixels: Vec<_> = pixels(gbuffer.size).collect();
+        if world.poses == previous.poses {
+            return vec![[0.0; 3]; pixels.len()];
+        }
         let motion = |&pixel: &UVec2| {
             let surface = Surface::read(gbuffer, &view, pixel)?;
             let key = self.key(&[pixel.x, pixel.y, frame]);

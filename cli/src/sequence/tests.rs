@@ -61,7 +61,9 @@ fn frame(number: u32) -> Frame {
         roughness: (0..pixels).map(|i| value(i, 1) / 128.0).collect(),
         depth: (0..pixels).map(|i| value(i, 4) / 0.3).collect(),
         motion: (0..pixels).map(|i| [0, 1].map(|c| value(i, c) / -700.0)).collect(),
-        hit_motion: number.is_multiple_of(3).then(|| (0..pixels).map(|i| [7, 2, 4].map(|c| value(i, c) / -64.0)).collect()),
+        hit_motion: number
+            .is_multiple_of(3)
+            .then(|| (0..pixels).map(|i| [7, 2, 4].map(|c| value(i, c) / -64.0)).collect()),
         reference: (number > 0).then(|| (0..pixels).map(|i| [0, 1, 2].map(|c| value(i, c + 5))).collect()),
     }
 }

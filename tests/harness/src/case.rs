@@ -52,15 +52,14 @@ pub struct Pixel {
 
 impl Pixel {
     /// A rough white wall, 4 units away, that faces a camera which looks along -z.
-    pub const WALL: Self =
-        Self {
-            radiance: [1.0; 4],
-            normal: [0.0, 0.0, 1.0],
-            roughness: 0.5,
-            depth: 4.0,
-            motion: [0.0; 2],
-            hit_motion: [0.0; 3],
-        };
+    pub const WALL: Self = Self {
+        radiance: [1.0; 4],
+        normal: [0.0, 0.0, 1.0],
+        roughness: 0.5,
+        depth: 4.0,
+        motion: [0.0; 2],
+        hit_motion: [0.0; 3],
+    };
 }
 
 /// The caller's images of a frame.

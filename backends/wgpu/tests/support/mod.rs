@@ -283,6 +283,7 @@ pub(crate) struct Images {
     pub(crate) roughness: wgpu::TextureView,
     pub(crate) depth: wgpu::TextureView,
     pub(crate) motion: wgpu::TextureView,
+    pub(crate) hit_motion: Option<wgpu::TextureView>,
     pub(crate) environment: Option<wgpu::TextureView>,
 }
 
