@@ -277,11 +277,12 @@ fn candidates_of(pixel: vec2<u32>, subject: Subject) -> Candidates {
         // The lobe's dominant direction is nearer to the normal the rougher the surface is.
         let dominant = (1.0 - alpha) * (sqrt(1.0 - alpha) + alpha);
         let distance = hit_distance_of(subject.share, camera_distance_of(subject.position)) * dominant;
-        var image = subject.position + view_direction(subject.position) * distance;
+        let image = subject.position + view_direction(subject.position) * distance;
+        let surface_moved = found.surface_uv - static_uv;
+        found.reflection_uv = prev_uv_of(image) + surface_moved;
         if HIT_MOTION {
-            image -= image_motion(pixel, subject.guide.normal, dominant);
+            found.reflection_uv = prev_uv_of(image - image_motion(pixel, subject.guide.normal, dominant)) + surface_moved;
         }
-        found.reflection_uv = prev_uv_of(image) + (found.surface_uv - static_uv);
         let tolerance = Tolerance(select(0.015, 0.1, moves), select(0.98, 0.95, r >= 0.3), share_tolerance);
         found.reflection = history_at(found.reflection_uv, subject.guide, subject.position, subject.share, tolerance);
     }
