@@ -172,6 +172,10 @@ fn hit_motion_is_that_of_what_mirrors_show() {
         for (index, pixel) in pixels(size).enumerate().filter(|(index, _)| frame.roughness[*index] < 0.01) {
             let surface = Surface::read(&frame, &view, pixel).expect("sky is rough");
             let [.., distance] = frame.radiance[index];
+            if distance >= 10_000.0 {
+                assert_eq!(hit_motion[index], [0.0; 3], "{name} {pixel}");
+                continue;
+            }
             let world = surface.origin - surface.view.reflect(surface.normal) * distance;
             let (moves, then) = carried_back(&scene, number, world, 0.02);
             moving += usize::from(moves);

@@ -140,7 +140,7 @@ fn blender_passes(frame: &Frame) -> Vec<(&'static str, Vec<AnyChannel<FlatSample
 #[test]
 fn files_as_blender_writes_them_are_read() {
     let folder = Folder::new("blender");
-    let mut frame = frame(0);
+    let mut frame = Frame { hit_motion: None, ..frame(0) };
     write_sequence(&folder.0, "blender", 1.0, [&frame]).unwrap();
     // Channels stored as whole numbers.
     frame.roughness = (0..frame.pixels()).map(|i| i as f32).collect();
