@@ -3,6 +3,7 @@
 //!
 //! in   radiance      any float    full    noisy input; a: hit distance
 //! in   motion        any float    full    uv motion of the surface (surface motion)
+//! in   hit_motion    any float    full    how far what was hit has moved (hit motion)
 //! in   guide         rg32uint     full    this frame's packed G-buffer, or normal, roughness, depth
 //! in   prev_guide    r32uint      full    last frame's, in fewer bits, or its normal, roughness, depth
 //! in   history       rgba16float  full    last frame's `history`
@@ -31,6 +32,8 @@ import package::shared::blocks;
 override MIRROR_PARALLAX: bool = true;
 // Looks for history where the surface was.
 override SURFACE_MOTION: bool = true;
+// Moves the reflected point back to where it was.
+override HIT_MOTION: bool = false;
 // Clips history of smooth surfaces to what the neighbourhood makes plausible.
 override HISTORY_CLIP: bool = true;
 // Forgets history where the light changed.
@@ -41,6 +44,7 @@ override OUTLIER_SPREAD: bool = true;
 override BLOCK_STATISTICS: bool = true;
 
 @group(0) @binding(5) var in_motion: texture_2d<f32>;
+@group(0) @binding(7) var in_hit_motion: texture_2d<f32>;
 
 @group(1) @binding(1) var in_prev_guide: texture_2d<u32>;
 @group(1) @binding(2) var in_history: texture_2d<f32>;
@@ -230,6 +234,14 @@ fn surface_prev_uv(pixel: vec2<u32>) -> vec2<f32> {
     return select(vec2<f32>(-4.0), clamp(uv, vec2<f32>(-4.0), vec2<f32>(4.0)), usable);
 }
 
+// How far the reflected point moved, behind its surface. The closer the lobe's dominant direction is to the normal, the
+// less what moves along the normal moves the image.
+fn image_motion(pixel: vec2<u32>, normal: vec3<f32>, dominant: f32) -> vec3<f32> {
+    let moved = textureLoad(in_hit_motion, pixel, 0).xyz;
+    let usable = select(vec3<f32>(0.0), moved, all_finite(moved));
+    return usable - normal * ((1.0 + dominant) * dot(usable, normal));
+}
+
 // A pixel, and this frame's sample of it.
 struct Subject {
     guide: Guide,
@@ -289,7 +301,11 @@ fn candidates_of(pixel: vec2<u32>, subject: Subject) -> Candidates {
         let dominant = (1.0 - alpha) * (sqrt(1.0 - alpha) + alpha);
         let distance = hit_distance_of(subject.share, camera_distance_of(subject.position)) * dominant;
         let image = subject.position + view_direction(subject.position) * distance;
-        found.reflection_uv = prev_uv_of(image) + (found.surface_uv - static_uv);
+        let surface_moved = found.surface_uv - static_uv;
+        found.reflection_uv = prev_uv_of(image) + surface_moved;
+        if HIT_MOTION {
+            found.reflection_uv = prev_uv_of(image - image_motion(pixel, subject.guide.normal, dominant)) + surface_moved;
+        }
         let tolerance = Tolerance(select(0.015, 0.1, moves), select(0.98, 0.95, r >= 0.3), share_tolerance);
         found.reflection = history_at(found.reflection_uv, subject.guide, subject.position, subject.share, tolerance);
     }

@@ -134,7 +134,8 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
     block.guide = choice.guide;
     block.radiance = radiance.rgb * normalization;
     block.excess = excess * normalization;
-    block.share = select(0.5, share.x / max(share.y, 1e-6), share.y > 0.0);
+    // Weights next to nothing say nothing, and some devices round them to 0.
+    block.share = select(0.5, share.x / max(share.y, 1e-6), share.y > 1e-6);
     if ACCUMULATED {
         // Variance over time where most pixels know it, else variance over the block.
         let spatial = max(moments.y - moments.x * moments.x, 0.0);

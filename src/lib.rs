@@ -39,6 +39,7 @@
 //! | normal | world space, [`NormalEncoding`](settings::NormalEncoding); a pixel with a zero or non-finite normal counts as sky |
 //! | roughness | perceptual or GGX alpha (perceptual squared); a pixel where it is not finite counts as sky |
 //! | motion | `uv_now - uv_before` of the surface after multiplication by `motion_scale`, object motion included: `previous = uv - motion * scale` |
+//! | hit motion | optional: world-space position of what the reflected ray hit, minus its position last frame; 0 for sky and what rests; NaN and infinity count as 0 |
 //! | last frame's normal, roughness, depth | only without the feature `gbuffer_copy`: the images of the preceding frame, encoded as this frame's and as large as that frame was. Where there is no history (first frame, reset, resize) they may hold anything, of any size |
 //! | jitter | where in the pixel the camera sampled, in pixels from the centre; history is kept at pixel centres |
 //! | exposure | [`FrameInputs::exposure`] brings radiance near 1, where the published constants were tuned; images go in and out unexposed |

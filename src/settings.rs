@@ -270,6 +270,9 @@ pub struct Features {
     /// Published pipeline: mixes the 8x8 average into the colour where history is short. Less noise after
     /// disocclusion, less detail.
     pub average_mixing: bool,
+    /// Footprint pipeline, with `mirror_parallax`: reads how far what the reflected ray hit has moved, from the input
+    /// `hit_motion`, and looks for history of the reflected point there. For mirrors that show moving things.
+    pub hit_motion: bool,
     /// Footprint pipeline: forgets history where the light changed.
     pub light_change: bool,
     /// Footprint pipeline: cuts outliers off and adds what was cut off, spread, up to a limit. An input without
@@ -307,6 +310,7 @@ impl Default for Features {
             spatial_filter: true,
             history_clip: true,
             average_mixing: true,
+            hit_motion: false,
             light_change: true,
             outlier_spread: true,
             block_statistics: true,

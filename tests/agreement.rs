@@ -154,6 +154,7 @@ const CALM: FrameSpec = FrameSpec {
     normals: Normals::Facing,
     normal_length: Field::Constant(1.0),
     motion: Motion::Uniform(0.0, 0.0),
+    hit_motion: Field::Constant(0.0),
     camera_shift: 0.0,
     camera_turn: 0.0,
     jitter: (0.0, 0.0),

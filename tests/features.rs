@@ -35,7 +35,8 @@ fn off(pipeline: Pipeline) -> Vec<(&'static str, Change)> {
         ("edge_repair", |features| features.edge_repair = false),
         ("average_mixing", |features| features.average_mixing = false),
     ];
-    let footprint: [(&str, Change); 5] = [
+    let footprint: [(&str, Change); 6] = [
+        ("hit_motion", |features| features.hit_motion = false),
         ("light_change", |features| features.light_change = false),
         ("outlier_spread", |features| features.outlier_spread = false),
         ("wide_filter", |features| features.wide_filter = false),
@@ -50,9 +51,11 @@ fn find(pipeline: Pipeline, name: &str) -> Change {
     off(pipeline).into_iter().find(|(n, _)| *n == name).unwrap().1
 }
 
+/// Every feature on, and changes of that.
 fn with(pipeline: Pipeline, changes: &[Change]) -> Settings {
     let mut settings = Settings::default();
     settings.pipeline = pipeline;
+    settings.features.hit_motion = true;
     changes.iter().for_each(|change| change(&mut settings.features));
     settings
 }

@@ -85,6 +85,8 @@ proptest! {
             let textures = sampled.filter(|b| !matches!(b.variable.as_str(), "frame" | "in_tiles" | "in_args"));
             prop_assert!(textures.count() <= 16, "{}", pass.name);
         }
+        let moves_hits = features.hit_motion && features.mirror_parallax && !is_published;
+        prop_assert_eq!(plan.inputs().any(|i| i == "hit_motion"), moves_hits);
         let has_pass = |kernel: &str| plan.passes.iter().any(|pass| pass.kernel == kernel);
         prop_assert_eq!(plan.inputs().any(|i| i == "roughness"), features.constant_roughness.is_none());
         prop_assert_eq!(has_pass("prefilter"), is_published && features.spatial_filter);

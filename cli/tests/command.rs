@@ -184,6 +184,30 @@ fn debug_views_come_with_a_legend_and_change_nothing() {
 }
 
 #[test]
+fn hit_motion_is_used_where_there_is_some_and_asked_for_where_there_is_none() {
+    let folder = Folder::new("hit-motion");
+    let score = |scene: &str, options: &[&str]| {
+        let out = folder.join(&format!("{scene}{}", options.len()));
+        demo(path(&out), &[&["--scene", scene, "--backend", "cpu"], options].concat())["denoised"]["mean"]["psnr"]
+            .clone()
+    };
+    let on = "--features=hit_motion";
+    assert!(score("carousel", &[on]).as_f64() > score("carousel", &[]).as_f64());
+    assert_eq!(score("still", &[on]), score("still", &[]));
+
+    let sequence = Sequence::open(&folder.join("carousel0/noisy"), &ChannelNames::default()).unwrap();
+    let frame = limpid_cli::sequence::Frame { hit_motion: None, ..sequence.load(1).unwrap() };
+    let (without, out) = (folder.join("without"), folder.join("out"));
+    limpid_cli::sequence::write_sequence(&without, "without", 1.0, [frame]).unwrap();
+    for backend in ["cpu", "auto"] {
+        let arguments = ["denoise", path(&without), "--out", path(&out), on, "--backend", backend];
+        fails(&arguments, 1, &["frame_0001.exr", "hit_motion.X", "--channel"]);
+    }
+    let renamed = ["--channel", "hit_motion=normal"];
+    succeeds(&[&["denoise", path(&without), "--out", path(&out), on], &renamed[..]].concat());
+}
+
+#[test]
 fn fewer_rays_cost_error() {
     let folder = Folder::new("rays");
     let mut psnr = Vec::new();

@@ -68,6 +68,7 @@ unsafe fn run() -> Result<(), Box<dyn Error>> {
             roughness: input(&roughness),
             depth: input(&depth),
             motion: input(&motion),
+            hit_motion: None,
             environment: None,
             previous: None,
         };

@@ -44,6 +44,8 @@ pub struct Inputs {
     pub depth: Input,
     /// Motion vectors in `rg`.
     pub motion: Input,
+    /// World-space motion of what was hit, in `rgb`. Only for the feature `hit_motion`.
+    pub hit_motion: Option<Input>,
     /// Equirectangular radiance with its mip chain. Only for `Fallback::Environment`.
     pub environment: Option<Input>,
     /// Last frame's G-buffer. Only without the feature `gbuffer_copy`.
@@ -59,6 +61,7 @@ impl Inputs {
             "roughness" => ("roughness", Some(self.roughness)),
             "depth" => ("depth", Some(self.depth)),
             "motion" => ("motion", Some(self.motion)),
+            "hit_motion" => ("hit_motion", self.hit_motion),
             "environment" => ("environment", self.environment),
             "prev_normal" => ("previous.normal", self.previous.map(|previous| previous.normal)),
             "prev_roughness" => ("previous.roughness", self.previous.map(|previous| previous.roughness)),

@@ -105,6 +105,7 @@ fn inputs_that_do_not_fit_are_refused_and_nothing_is_recorded() {
         roughness: single.input(),
         depth: single.input(),
         motion: wide.input(),
+        hit_motion: None,
         environment: None,
         previous: None,
     };
@@ -144,6 +145,10 @@ fn inputs_that_do_not_fit_are_refused_and_nothing_is_recorded() {
     assert!(["`previous.depth`", "[24, 15]", "[24, 16]"].iter().all(|part| error.contains(part)), "{error}");
     settings.features.gbuffer_copy = true;
 
+    settings.features.hit_motion = true;
+    let error = record(&mut new(&settings), &good, &frame(SIZE)).unwrap_err();
+    assert!(matches!(error, OffscreenError::Denoiser(Error::InputMissing { input: "hit_motion" })), "{error}");
+    let good = Inputs { hit_motion: Some(wide.input()), ..good };
     settings.coverage.fallback = Fallback::Environment;
     let error = record(&mut new(&settings), &good, &frame(SIZE)).unwrap_err();
     assert!(matches!(error, OffscreenError::Denoiser(Error::InputMissing { input: "environment" })), "{error}");
@@ -169,6 +174,7 @@ fn several_denoisers_live_on_one_device() {
         roughness: &image,
         depth: &image,
         motion: &image,
+        hit_motion: None,
         environment: None,
         previous: None,
     };

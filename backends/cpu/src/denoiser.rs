@@ -36,6 +36,8 @@ pub struct Inputs<'a> {
     pub depth: &'a Texture,
     /// Motion vectors in the first two channels.
     pub motion: &'a Texture,
+    /// World-space motion of what was hit, in `rgb`. Only for the feature `hit_motion`.
+    pub hit_motion: Option<&'a Texture>,
     /// Equirectangular radiance with its mip chain. Only for `Fallback::Environment`.
     pub environment: Option<&'a Texture>,
     /// Last frame's G-buffer. Only without the feature `gbuffer_copy`.
@@ -50,6 +52,7 @@ impl<'a> Inputs<'a> {
             "roughness" => Some(self.roughness),
             "depth" => Some(self.depth),
             "motion" => Some(self.motion),
+            "hit_motion" => self.hit_motion,
             "environment" => self.environment,
             "prev_normal" => self.previous.map(|previous| previous.normal),
             "prev_roughness" => self.previous.map(|previous| previous.roughness),

@@ -116,6 +116,7 @@ fn kernels_do_nothing_of_the_kind() {
         settings.features.packed_guide = index < 2;
         settings.pipeline = pipeline;
         settings.conventions.depth = limpid::settings::DepthEncoding::Linear;
+        settings.features.hit_motion = true;
         settings.coverage.roughness_threshold = 0.7;
         settings.coverage.fallback = fallback;
         settings.coverage.ray_list = rays.map(|rays| {
@@ -139,6 +140,8 @@ fn kernels_do_nothing_of_the_kind() {
             let roughness = image(TexelFormat::R32Float, size, |p| vec![seed(p / 8, 5)]);
             let depth = image(TexelFormat::R32Float, size, |p| vec![depth(p)]);
             let motion = image(TexelFormat::Rg32Float, size, |p| vec![seed(p, 6) * 0.3 - 0.15, seed(p, 7) * 3.0 - 1.5]);
+            let hit_motion =
+                image(TexelFormat::Rgba32Float, size, |p| vec![seed(p, 8) - 0.5, seed(p, 9) * 1e30, 0.0, 0.0]);
             // The last frame uses a part of the textures.
             let frame_size = if number == 3 { UVec2::new(33, 20) } else { size };
             let inputs = Inputs {
@@ -147,6 +150,7 @@ fn kernels_do_nothing_of_the_kind() {
                 roughness: &roughness,
                 depth: &depth,
                 motion: &motion,
+                hit_motion: Some(&hit_motion),
                 environment: Some(&environment),
                 previous: Some(PrevGbuffer { normal: &normal, roughness: &roughness, depth: &depth }),
             };

@@ -26,8 +26,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     upload(&queue, &motion, &[0.0f32, 0.0]);
     let views = [&radiance, &normal, &roughness, &depth, &motion].map(|t| t.create_view(&Default::default()));
     let [radiance_view, normal, roughness, depth, motion] = &views;
-    let inputs =
-        Inputs { radiance: radiance_view, normal, roughness, depth, motion, environment: None, previous: None };
+    let inputs = Inputs {
+        radiance: radiance_view,
+        normal,
+        roughness,
+        depth,
+        motion,
+        hit_motion: None,
+        environment: None,
+        previous: None,
+    };
 
     let mut settings = Settings::default();
     settings.conventions.depth = DepthEncoding::Linear;

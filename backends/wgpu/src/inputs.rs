@@ -33,6 +33,8 @@ pub struct Inputs<'a> {
     pub depth: &'a wgpu::TextureView,
     /// Motion vectors in `rg`.
     pub motion: &'a wgpu::TextureView,
+    /// World-space motion of what was hit, in `rgb`. Only for the feature `hit_motion`.
+    pub hit_motion: Option<&'a wgpu::TextureView>,
     /// Equirectangular radiance with its mip chain. Only for `Fallback::Environment`.
     pub environment: Option<&'a wgpu::TextureView>,
     /// Last frame's G-buffer. Only without the feature `gbuffer_copy`.
@@ -48,6 +50,7 @@ impl<'a> Inputs<'a> {
             "roughness" => Some(self.roughness),
             "depth" => Some(self.depth),
             "motion" => Some(self.motion),
+            "hit_motion" => self.hit_motion,
             "environment" => self.environment,
             "prev_normal" => self.previous.map(|previous| previous.normal),
             "prev_roughness" => self.previous.map(|previous| previous.roughness),
@@ -91,6 +94,7 @@ fn requirement(name: &str, settings: &Settings) -> (&'static str, u8) {
         "roughness" => ("roughness", of_roughness),
         "depth" => ("depth", 1),
         "motion" => ("motion", 2),
+        "hit_motion" => ("hit_motion", 3),
         "prev_normal" => ("previous.normal", of_normal),
         "prev_roughness" => ("previous.roughness", of_roughness),
         "prev_depth" => ("previous.depth", 1),

@@ -15,7 +15,7 @@
 //! // Every frame, after the G-buffer and the reflection rays.
 //! let (radiance, normal, roughness, depth, motion) = (view, view, view, view, view);
 //! let mut encoder = device.create_command_encoder(&Default::default());
-//! let inputs = Inputs { radiance, normal, roughness, depth, motion, environment: None, previous: None };
+//! let inputs = Inputs { radiance, normal, roughness, depth, motion, hit_motion: None, environment: None, previous: None };
 //! denoiser.encode(queue, &mut encoder, &inputs, &FrameInputs::new(camera, size))?;
 //! let denoised: &wgpu::TextureView = denoiser.output();
 //! // ... shade with `denoised` in the same encoder or a later one, then

@@ -110,6 +110,7 @@ fn unusable_inputs_are_refused_by_name() {
 fn what_an_input_must_have_depends_on_the_settings() {
     let Some(gpu) = Gpu::open() else { return };
     let mut settings = linear_settings();
+    settings.features.hit_motion = true;
     settings.coverage.fallback = Fallback::Environment;
     settings.conventions.normal = NormalEncoding::Octahedral;
     settings.conventions.roughness_channel = Channel::Green;
@@ -117,6 +118,12 @@ fn what_an_input_must_have_depends_on_the_settings() {
     let good = Scene::noisy_wall(SIZE, 0).upload(&gpu);
     let mut encode =
         |images: &Images| denoiser.encode(&gpu.queue, &mut gpu.encoder(), &images.inputs(), &still_frame(SIZE));
+    assert_says(&encode(&good).unwrap_err(), "InputMissing", &["`hit_motion`", "settings"]);
+    let flat = Images { hit_motion: Some(view(&gpu, SIZE, Rg16Float, |_| ())), ..good.clone() };
+    assert_says(&encode(&flat).unwrap_err(), "InputFormat", &["`hit_motion`", "Rg16Float", "3 channels"]);
+    let small = Images { hit_motion: Some(view(&gpu, SIZE - 1, Rgba16Float, |_| ())), ..good.clone() };
+    assert_says(&encode(&small).unwrap_err(), "InputSize", &["`hit_motion`", "[39, 23]", "[40, 24]"]);
+    let good = Images { hit_motion: Some(view(&gpu, SIZE, Rgba16Float, |_| ())), ..good };
     assert_says(&encode(&good).unwrap_err(), "InputMissing", &["`environment`", "settings"]);
     let texel = UVec2::ONE;
     let environment = Some(view(&gpu, texel, Rg16Float, |_| ()));

@@ -133,6 +133,7 @@ fn assert_may_be_compact(gpu: &Gpu, settings: &Settings) {
             roughness: gpu.upload(SIZE, R8Unorm, &[153u8].repeat(count)),
             depth: cleared_depth(gpu, format, 0.5),
             motion: gpu.upload(SIZE, Rg16Float, &halves(&texels(&|p| p.motion.to_array().to_vec()))),
+            hit_motion: None,
             environment: None,
         };
         let frame = still_frame(SIZE);

@@ -19,6 +19,8 @@ const WIDE: [f32; 2] = [1.0, 3.0];
 pub(super) const OUTLIER_ROUGHNESS: f32 = 0.015;
 /// Roughness up to which light that changes is not looked for (`kernels/accumulate.wgsl`).
 pub(super) const LIGHT_ROUGHNESS: f32 = 0.05;
+/// Roughness from which on the reflected point's history alone is worth nothing (`kernels/accumulate.wgsl`).
+pub(super) const REFLECTION_UP_TO: f32 = 0.6;
 /// Pixels along a side of a cell whose light is compared.
 const CELL: u32 = 8;
 /// Fewest surfaces of a cell that say anything.
@@ -49,6 +51,8 @@ pub struct Needs {
     pub camera_rests: bool,
     /// Surfaces with motion vectors that are not next to 0.
     pub moving: f64,
+    /// Surfaces that reflect things which move, by `hit_motion`, and are smooth enough to show it.
+    pub moving_hits: f64,
     /// Cells of 8x8 pixels, in the frame where it is most, whose light changes at roughness above 0.05.
     pub light_changes: f64,
     /// The same at roughness below `accumulate.clip_roughness`.
@@ -80,6 +84,7 @@ pub(super) struct Gatherer {
     narrow: usize,
     outliers: usize,
     moving: usize,
+    moving_hits: usize,
     changes: [f64; 2],
     resting: usize,
     noisy: usize,
@@ -129,6 +134,7 @@ impl Gatherer {
             narrow: 0,
             outliers: 0,
             moving: 0,
+            moving_hits: 0,
             changes: [0.0; 2],
             resting: 0,
             noisy: 0,
@@ -170,6 +176,8 @@ impl Gatherer {
             self.roughness = [low.min(frame.roughness[i]), high.max(frame.roughness[i])];
             let motion = Vec2::from(frame.motion[i]) * frame.size.as_vec2();
             self.moving += usize::from(motion.length() > AT_REST);
+            let hit_moves = frame.hit_motion.as_ref().is_some_and(|motion| moves(motion[i]));
+            self.moving_hits += usize::from(hit_moves && frame.roughness[i] < REFLECTION_UP_TO);
             let radius = self.filter_radius(frame, &inverse, i);
             self.wide += usize::from(radius[1].is_nan() || radius[1] > WIDE[0]);
             self.narrow += usize::from(radius[0].is_nan() || radius[0] < WIDE[1]);
@@ -291,12 +299,18 @@ impl Gatherer {
             outliers: of(self.outliers),
             camera_rests: self.camera_rests,
             moving: of(self.moving),
+            moving_hits: of(self.moving_hits),
             light_changes: self.changes[0],
             reflections_change: self.changes[1],
             noisy: (self.resting > 0).then(|| share(self.noisy, self.resting)),
             mirrors_up_to: mirrors.map(|k| (k + 1) as f32 / STEPS as f32),
         }
     }
+}
+
+/// Whether what was hit has moved; what is no number counts as none.
+fn moves(hit_motion: [f32; 3]) -> bool {
+    hit_motion.iter().all(|x| x.is_finite()) && hit_motion != [0.0; 3]
 }
 
 fn share(count: usize, all: usize) -> f64 {
@@ -321,6 +335,9 @@ impl fmt::Display for Needs {
             f,
             "  changes      light in {light} of cells, reflections in smooth surfaces in {reflections}, at most"
         )?;
+        if self.moving_hits > 0.0 {
+            writeln!(f, "  hit motion   {} of surfaces reflect things that move", percent(self.moving_hits))?;
+        }
         match self.noisy {
             Some(noisy) => {
                 writeln!(f, "  noise        {} of pixels at rest change from frame to frame", percent(noisy))

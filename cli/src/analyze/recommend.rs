@@ -9,7 +9,7 @@ use limpid::{Plan, Settings};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use super::needs::{LIGHT_ROUGHNESS, OUTLIER_ROUGHNESS};
+use super::needs::{LIGHT_ROUGHNESS, OUTLIER_ROUGHNESS, REFLECTION_UP_TO};
 use super::{Content, Needs, percent};
 use crate::bench::counts::Counts;
 
@@ -192,15 +192,21 @@ fn footprint(needs: &Needs, settings: &Settings) -> Vec<Change> {
     } else if all_rests(needs) {
         changes.push(Change::off("history_clip", "nothing moves and no reflection changes", "all of that stays so"));
     }
-    changes.extend(motion(needs));
+    let reflects_motion = needs.moving_hits > FEW;
+    if reflects_motion {
+        let because = format!("{} of surfaces reflect things that move", percent(needs.moving_hits));
+        changes.push(Change::new("features.hit_motion", json!(true), because, "hit motion is supplied"));
+    } else {
+        changes.push(Change::off("hit_motion", "no hit motion says that reflected things move", "none does"));
+    }
+    // Where reflected things move they are not seen where they were.
+    changes.extend(motion(needs).filter(|change| !(reflects_motion && change.setting == "features.mirror_parallax")));
     changes
 }
 
 /// One of the two ways to find history, where both lead to the same place.
 fn motion(needs: &Needs) -> Option<Change> {
     let [smoothest, roughest] = needs.roughness;
-    // Beyond, the reflected point alone is worth nothing.
-    const REFLECTION_UP_TO: f32 = 0.6;
     if needs.continued < ENOUGH_FRAMES {
         return None;
     }

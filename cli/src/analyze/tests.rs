@@ -245,3 +245,28 @@ fn surfaces_that_are_not_traced_are_left_out() {
     let settings: Settings = toml::from_str(&found.settings).unwrap();
     assert!((0.25..0.36).contains(&settings.coverage.roughness_threshold), "{found}");
 }
+
+#[test]
+fn hit_motion_is_recommended_where_reflected_things_move() {
+    let recommended = |name: &str, change: fn(&mut Frame)| {
+        let scene = scene::by_name(name).unwrap();
+        let mut analyzer = Analyzer::new(SIZE / 2, &Settings::default(), 1.0);
+        for number in 0..6 {
+            let mut frame = scene.render(number, SIZE / 2, 0);
+            change(&mut frame);
+            analyzer.add(frame);
+        }
+        let analysis = analyzer.finish().unwrap();
+        assert_eq!(errors(&analysis), Vec::<&str>::new(), "{name}\n{analysis}");
+        let features = toml::from_str::<Settings>(&analysis.settings).unwrap().features;
+        (features.hit_motion, features.mirror_parallax)
+    };
+    assert_eq!(recommended("mirrors", |_| ()), (true, true));
+    // With the camera at rest only motion leads elsewhere than to where reflected points are seen now.
+    assert_eq!(recommended("carousel", |_| ()), (true, true));
+    assert_eq!(recommended("carousel", |frame| frame.hit_motion = None), (false, false));
+    let nothing: fn(&mut Frame) =
+        |frame| frame.hit_motion.iter_mut().flatten().for_each(|motion| *motion = [f32::NAN; 3]);
+    assert_eq!(recommended("carousel", nothing), (false, false));
+    assert_eq!(recommended("still", |_| ()).0, false);
+}

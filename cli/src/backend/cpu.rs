@@ -55,11 +55,12 @@ fn radiance_texture(size: UVec2, radiance: &[[f32; 4]]) -> Texture {
 fn all_inputs<'a>(
     radiance: &'a Texture,
     motion: &'a Texture,
+    hit_motion: Option<&'a Texture>,
     [normal, roughness, depth]: &'a [Texture; 3],
     [prev_normal, prev_roughness, prev_depth]: &'a [Texture; 3],
 ) -> Inputs<'a> {
     let previous = Some(PrevGbuffer { normal: prev_normal, roughness: prev_roughness, depth: prev_depth });
-    Inputs { radiance, normal, roughness, depth, motion, environment: None, previous }
+    Inputs { radiance, normal, roughness, depth, motion, hit_motion, environment: None, previous }
 }
 
 /// The first three channels and the fourth.
@@ -91,11 +92,13 @@ impl Backend for Cpu {
         let roughness = texture(TexelFormat::R32Float, size, frame.roughness.iter().copied());
         let depth = texture(TexelFormat::R32Float, size, frame.depth.iter().copied());
         let motion = texture(TexelFormat::Rg32Float, size, frame.motion.iter().flatten().copied());
+        let hit_motion = super::hit_motion(self.plan(), frame)?;
+        let hit_motion = hit_motion.map(|m| texture(TexelFormat::Rgba32Float, size, m.into_iter().flatten()));
         let mut radiance = radiance_texture(size, &frame.radiance);
         let gbuffer = [normal, roughness, depth];
         let previous = self.last.as_ref().unwrap_or(&gbuffer);
 
-        let inputs = all_inputs(&radiance, &motion, &gbuffer, previous);
+        let inputs = all_inputs(&radiance, &motion, hit_motion.as_ref(), &gbuffer, previous);
         let (mut time, mut cpu_time) = (Duration::ZERO, Duration::ZERO);
         timed(&mut time, &mut cpu_time, || self.denoiser.run_classify(&inputs, &frame_inputs))?;
         let mut rays = frame.depth.iter().filter(|depth| **depth > 0.0).count() as u64;
@@ -108,7 +111,7 @@ impl Backend for Cpu {
             radiance = radiance_texture(size, &values);
             traced = Some(values);
         }
-        let inputs = all_inputs(&radiance, &motion, &gbuffer, previous);
+        let inputs = all_inputs(&radiance, &motion, hit_motion.as_ref(), &gbuffer, previous);
         timed(&mut time, &mut cpu_time, || self.denoiser.run_denoise(&inputs))?;
         self.last = Some(gbuffer);
         let (radiance, variance) = read_halves(self.denoiser.output(), size);

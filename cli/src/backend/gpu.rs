@@ -28,6 +28,7 @@ struct Gbuffer {
 struct Images {
     radiance: Image,
     motion: Image,
+    hit_motion: Image,
     gbuffer: Gbuffer,
     previous: Gbuffer,
 }
@@ -104,10 +105,11 @@ impl Gbuffer {
 
 impl Images {
     fn new(device: &wgpu::Device, size: UVec2) -> Self {
-        use wgpu::TextureFormat::{Rg32Float, Rgba16Float};
+        use wgpu::TextureFormat::{Rg32Float, Rgba16Float, Rgba32Float};
         Self {
             radiance: image(device, "radiance", size, Rgba16Float),
             motion: image(device, "motion", size, Rg32Float),
+            hit_motion: image(device, "hit motion", size, Rgba32Float),
             gbuffer: Gbuffer::new(device, size),
             previous: Gbuffer::new(device, size),
         }
@@ -121,6 +123,7 @@ impl Images {
             roughness: &self.gbuffer.roughness.view,
             depth: &self.gbuffer.depth.view,
             motion: &self.motion.view,
+            hit_motion: Some(&self.hit_motion.view),
             environment: None,
             previous: Some(PrevGbuffer { normal: &normal.view, roughness: &roughness.view, depth: &depth.view }),
         }
@@ -161,12 +164,16 @@ impl Gpu {
         self.upload(&self.images.radiance, size, &halves);
     }
 
-    fn upload_gbuffer(&self, frame: &Frame) {
+    fn upload_gbuffer(&self, frame: &Frame) -> Result<()> {
         let normals: Vec<[f32; 4]> = frame.normal.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect();
         self.upload(&self.images.gbuffer.normal, frame.size, &normals);
         self.upload(&self.images.gbuffer.roughness, frame.size, &frame.roughness);
         self.upload(&self.images.gbuffer.depth, frame.size, &frame.depth);
         self.upload(&self.images.motion, frame.size, &frame.motion);
+        if let Some(motion) = super::hit_motion(self.denoiser.plan(), frame)? {
+            self.upload(&self.images.hit_motion, frame.size, &motion);
+        }
+        Ok(())
     }
 
     fn readback_buffer(&self, size: u64) -> wgpu::Buffer {
@@ -270,7 +277,7 @@ impl Backend for Gpu {
         inputs.frame_seconds = frame.seconds;
         inputs.exposure = exposure;
         self.images.advance();
-        self.upload_gbuffer(frame);
+        self.upload_gbuffer(frame)?;
         if tracer.is_none() {
             self.upload_radiance(frame.size, &frame.radiance);
         }

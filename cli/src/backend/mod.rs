@@ -6,7 +6,7 @@ mod vulkan;
 
 use std::time::{Duration, Instant};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::ValueEnum;
 use cpu_time::ProcessTime;
 use glam::UVec2;
@@ -56,6 +56,18 @@ pub trait Backend {
     ///
     /// For frames that the library refuses and for a device that fails.
     fn denoise(&mut self, frame: &Frame, exposure: f32, tracer: Option<Tracer<'_>>) -> Result<Denoised>;
+}
+
+/// The motion of what was hit, in four channels, where a plan wants it.
+fn hit_motion(plan: &Plan, frame: &Frame) -> Result<Option<Vec<[f32; 4]>>> {
+    if !plan.inputs().any(|input| input == "hit_motion") {
+        return Ok(None);
+    }
+    let motion = frame.hit_motion.as_ref().context(
+        "there is no hit motion, which the feature hit_motion needs: expected channels hit_motion.X, .Y and .Z, or other \
+         ones named with --channel hit_motion=NAME",
+    )?;
+    Ok(Some(motion.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect()))
 }
 
 /// Runs `work` and adds its duration and processor time.

@@ -86,11 +86,15 @@ impl Backend for Vulkan {
         let depth = upload(context, Format::R32_SFLOAT, size, &frame.depth)?;
         let motion = upload(context, Format::R32G32_SFLOAT, size, &frame.motion)?;
         let radiance = upload(context, Format::R16G16B16A16_SFLOAT, size, &half_texels(&frame.radiance))?;
+        let hit_motion = super::hit_motion(session.denoiser().plan(), frame)?;
+        let hit_motion = hit_motion.map(|m| upload(context, Format::R32G32B32A32_SFLOAT, size, &m)).transpose()?;
         let gbuffer = [normal, roughness, depth];
         let previous = Some(self.last.as_ref().unwrap_or(&gbuffer).each_ref());
         let [normal, roughness, depth] = &gbuffer;
         let (radiance, motion) = (&radiance, &motion);
-        let inputs = UploadedInputs { radiance, normal, roughness, depth, motion, environment: None, previous };
+        let hit_motion = hit_motion.as_ref();
+        let inputs =
+            UploadedInputs { radiance, normal, roughness, depth, motion, hit_motion, environment: None, previous };
         let mut rays = frame.depth.iter().filter(|depth| **depth > 0.0).count() as u64;
         let (mut time, mut cpu_time) = (Duration::ZERO, Duration::ZERO);
         let mut traced = None;

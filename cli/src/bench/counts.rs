@@ -33,7 +33,7 @@ pub struct Counts {
 fn input_bytes(name: &str) -> f64 {
     match name {
         "normal" | "prev_normal" => 16.0,
-        "radiance" | "motion" | "environment" => 8.0,
+        "radiance" | "motion" | "hit_motion" | "environment" => 8.0,
         _ => 4.0,
     }
 }

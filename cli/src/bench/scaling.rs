@@ -59,6 +59,7 @@ fn resized(frame: &Frame, size: UVec2) -> Frame {
         roughness: enlarged(&frame.roughness, frame.size, size),
         depth: enlarged(&frame.depth, frame.size, size),
         motion: enlarged(&frame.motion, frame.size, size),
+        hit_motion: frame.hit_motion.as_ref().map(|image| enlarged(image, frame.size, size)),
         reference: None,
         ..*frame
     }

@@ -31,7 +31,7 @@ pub(super) struct Denoise {
     #[command(flatten)]
     debug_view: DebugViewOptions,
     /// Channel of the EXR files for an input, such as depth=ViewLayer.Depth.Z. Inputs are radiance,
-    /// hit_distance, normal, roughness, depth, motion and reference; a name stands for all channels that
+    /// hit_distance, normal, roughness, depth, motion, hit_motion and reference; a name stands for all channels that
     /// begin with it, a comma separates exact names. Can be given more than once.
     #[arg(long, value_name = "INPUT=NAME")]
     channel: Vec<String>,
@@ -126,14 +126,13 @@ impl Denoise {
         let mut recorder = Recorder::new(exposure);
         let progress = ProgressBar::new(sequence.len() as u64);
         for (index, (exr, png)) in outputs.iter().enumerate() {
-            let frame = sequence.load(index)?;
+            let (source, frame) = (sequence.path(index)?, sequence.load(index)?);
             let warnings = frame.warnings();
             if !warnings.is_empty() {
-                progress.suspend(|| {
-                    eprintln!("warning: {}: {warnings}", sequence.path(index).unwrap_or_default().display())
-                });
+                progress.suspend(|| eprintln!("warning: {}: {warnings}", source.display()));
             }
-            let denoised = backend.denoise(&frame, exposure, None)?;
+            let denoised = backend.denoise(&frame, exposure, None);
+            let denoised = denoised.with_context(|| format!("cannot denoise {}", source.display()))?;
             let metadata: Metadata = sequence.metadata(index)?;
             sequence::write_exr(exr, frame.size, &denoised.radiance, &metadata)?;
             if writes_png {

@@ -58,6 +58,7 @@ fn frame(t: u32) -> Frame {
         roughness: vec![0.5; pixels],
         depth: surface.iter().map(|z| z[0]).collect(),
         motion: vec![[0.0; 2]; pixels],
+        hit_motion: None,
         reference: Some(reference(t)),
     }
 }

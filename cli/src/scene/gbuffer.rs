@@ -62,6 +62,7 @@ pub(super) fn gbuffer(world: &World, previous: Option<&World>, number: u32, size
         roughness: pixels.iter().map(|p| p.roughness).collect(),
         depth: pixels.iter().map(|p| p.depth).collect(),
         motion: pixels.iter().map(|p| p.motion).collect(),
+        hit_motion: None,
         reference: None,
     }
 }

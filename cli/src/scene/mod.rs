@@ -103,11 +103,33 @@ impl Scene {
         image
     }
 
-    /// G-buffer alone: the radiance is zero and there is no reference.
+    /// G-buffer and the motion of what reflected rays hit: the radiance is zero and there
+    /// is no reference.
     pub fn gbuffer(&self, frame: u32, size: UVec2) -> Frame {
         let cut = frame == 0 || self.shots.iter().any(|shot| shot.first == frame);
         let previous = (!cut).then(|| World::new(self, frame - 1));
-        gbuffer::gbuffer(&World::new(self, frame), previous.as_ref(), frame, size)
+        let mut image = gbuffer::gbuffer(&World::new(self, frame), previous.as_ref(), frame, size);
+        image.hit_motion = Some(self.hit_motion(frame, &image));
+        image
+    }
+
+    /// How far what [`Scene::trace`] hits in each pixel has moved since the last frame, world units; zero after a cut, at
+    /// sky and where nothing is hit.
+    fn hit_motion(&self, frame: u32, gbuffer: &Frame) -> Vec<[f32; 3]> {
+        let (world, view) = (World::new(self, frame), View::new(&gbuffer.camera));
+        let previous = World::new(self, if gbuffer.reset { frame } else { frame - 1 });
+        let pixels: Vec<_> = pixels(gbuffer.size).collect();
+        if world.poses == previous.poses {
+            return vec![[0.0; 3]; pixels.len()];
+        }
+        let motion = |&pixel: &UVec2| {
+            let surface = Surface::read(gbuffer, &view, pixel)?;
+            let key = self.key(&[pixel.x, pixel.y, frame]);
+            let hit = transport::first_hit(&world, &surface, &mut Sampler::independent(key))?;
+            let [now, then] = [&world, &previous].map(|world| world.poses[hit.object].to_world(hit.local));
+            Some((now - then).to_array())
+        };
+        pixels.par_iter().with_min_len(64).map(|pixel| motion(pixel).unwrap_or_default()).collect()
     }
 
     /// The noisy signal of some pixels: radiance of one reflected ray and its hit distance, as

@@ -120,7 +120,6 @@ fn motion_and_depth_agree_with_matrices() {
             let frame = scene.gbuffer(number, TINY);
             let (camera, before) = (frame.camera, scene.camera(number - 1, TINY));
             let inverse = (camera.view_to_clip * camera.world_to_view).inverse();
-            let time = |number: u32| scene.time(number);
             let mut moving = 0;
             for (index, pixel) in pixels(TINY).enumerate() {
                 let (uv, depth) = (pixel_uv(pixel, TINY), frame.depth[index]);
@@ -130,18 +129,10 @@ fn motion_and_depth_agree_with_matrices() {
                 let ndc = Vec4::new(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, clip.z / clip.w, 1.0);
                 let world = inverse * ndc;
                 let world = world.truncate() / world.w;
-                // The object is the one whose surface the point lies on.
                 let carried = (depth > 0.0).then(|| {
-                    let off = |object: &Object| {
-                        let pose = object.pose(time(number));
-                        surface_distance(object, pose.rotation.inverse() * (world - pose.position))
-                    };
-                    let object = scene.objects.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-                    let object = object.expect("a scene has objects");
-                    assert!(off(object) < 5e-3 * view_depth, "{}: nothing here", scene.name);
-                    let (now, then) = (object.pose(time(number)), object.pose(time(number - 1)));
-                    moving += usize::from(now != then);
-                    then.position + then.rotation * (now.rotation.inverse() * (world - now.position))
+                    let (moves, then) = carried_back(&scene, number, world, 5e-3 * view_depth);
+                    moving += usize::from(moves);
+                    then
                 });
                 let eye = camera.world_to_view.inverse().w_axis.truncate();
                 let then = carried.map_or((world - eye).extend(0.0), |world| world.extend(1.0));
@@ -153,6 +144,48 @@ fn motion_and_depth_agree_with_matrices() {
             let rests = scene.objects.iter().all(|object| object.movement == Movement::default());
             assert_eq!(moving == 0, rests, "{}: {moving} moving pixels", scene.name);
         }
+    }
+}
+
+/// Whether the object whose surface is within `tolerance` of a point moves, and where it had the point a frame ago.
+fn carried_back(scene: &Scene, number: u32, world: Vec3, tolerance: f32) -> (bool, Vec3) {
+    let [now, then] = [number, number - 1].map(|number| scene.time(number));
+    let off = |object: &Object| {
+        let pose = object.pose(now);
+        surface_distance(object, pose.rotation.inverse() * (world - pose.position))
+    };
+    let object = scene.objects.iter().min_by(|a, b| off(a).total_cmp(&off(b))).expect("a scene has objects");
+    assert!(off(object) < tolerance, "{}: nothing here", scene.name);
+    let (now, then) = (object.pose(now), object.pose(then));
+    (now != then, then.position + then.rotation * (now.rotation.inverse() * (world - now.position)))
+}
+
+/// What perfect mirrors reflect, one hit distance along the reflected ray, has moved as the object there.
+#[test]
+fn hit_motion_is_that_of_what_mirrors_show() {
+    for name in ["mirrors", "carousel"] {
+        let scene = by_name(name).expect("a built-in scene");
+        let (number, size) = (7, UVec2::new(64, 36));
+        let frame = scene.render(number, size, 0);
+        let hit_motion = frame.hit_motion.as_ref().expect("scenes know it");
+        let (view, mut moving) = (View::new(&frame.camera), 0);
+        for (index, pixel) in pixels(size).enumerate().filter(|(index, _)| frame.roughness[*index] < 0.01) {
+            let surface = Surface::read(&frame, &view, pixel).expect("sky is rough");
+            let [.., distance] = frame.radiance[index];
+            if distance >= 10_000.0 {
+                assert_eq!(hit_motion[index], [0.0; 3], "{name} {pixel}");
+                continue;
+            }
+            let world = surface.origin - surface.view.reflect(surface.normal) * distance;
+            let (moves, then) = carried_back(&scene, number, world, 0.02);
+            moving += usize::from(moves);
+            let error = (Vec3::from(hit_motion[index]) - (world - then)).length();
+            assert!(error < 2e-5, "{name} {pixel}: {error}");
+            assert!(moves || hit_motion[index] == [0.0; 3]);
+        }
+        assert!(moving > 10, "{name}: {moving}");
+        let cut = scene.render(0, size, 0).hit_motion.expect("scenes know it");
+        assert!(cut.iter().all(|motion| *motion == [0.0; 3]), "{name}");
     }
 }
 

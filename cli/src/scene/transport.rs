@@ -47,6 +47,12 @@ pub(super) fn one_ray(world: &World, surface: &Surface, sampler: &mut Sampler) -
     [radiance.x, radiance.y, radiance.z, distance]
 }
 
+/// What the ray of [`one_ray`] hits, if anything.
+pub(super) fn first_hit(world: &World, surface: &Surface, sampler: &mut Sampler) -> Option<Hit> {
+    let lobe = Lobe::new(surface.normal, surface.view, surface.roughness);
+    world.hit(surface.origin, lobe.sample(sampler.pair())?)
+}
+
 /// The mean of the signal at a surface, estimated from `samples` well spread reflected rays.
 /// Lamps in the lobe are sought from both ends and weighted by the balance heuristic (Veach and
 /// Guibas 1995, "Optimally Combining Sampling Techniques").

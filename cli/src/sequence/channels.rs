@@ -17,6 +17,9 @@ pub struct ChannelNames {
     pub depth: String,
     /// Motion in uv: `motion.X`, `.Y`.
     pub motion: [String; 2],
+    /// World-space motion of what the reflection ray hit: `hit_motion.X`, `.Y`, `.Z`. Frames may lack all three as
+    /// long as the names are the default ones.
+    pub hit_motion: [String; 3],
     /// Converged radiance: `reference.R`, `.G`, `.B`. Frames may lack all three as long as the
     /// names are the default ones.
     pub reference: [String; 3],
@@ -52,7 +55,8 @@ pub enum ChannelOptionError {
     },
 }
 
-const KEYS: [&str; 7] = ["radiance", "hit_distance", "normal", "roughness", "depth", "motion", "reference"];
+const KEYS: [&str; 8] =
+    ["radiance", "hit_distance", "normal", "roughness", "depth", "motion", "hit_motion", "reference"];
 
 impl Default for ChannelNames {
     fn default() -> Self {
@@ -63,6 +67,7 @@ impl Default for ChannelNames {
             roughness: "roughness".to_owned(),
             depth: "Z".to_owned(),
             motion: with_suffixes("motion", ["X", "Y"]),
+            hit_motion: with_suffixes("hit_motion", ["X", "Y", "Z"]),
             reference: with_suffixes("reference", ["R", "G", "B"]),
         }
     }
@@ -86,6 +91,7 @@ impl ChannelNames {
             "roughness" => self.roughness = name.to_owned(),
             "depth" => self.depth = name.to_owned(),
             "motion" => self.motion = group(option, name, ["X", "Y"])?,
+            "hit_motion" => self.hit_motion = group(option, name, ["X", "Y", "Z"])?,
             "reference" => self.reference = group(option, name, ["R", "G", "B"])?,
             _ => {
                 return Err(ChannelOptionError::UnknownKey { option: option.to_owned(), key: key.to_owned() });
@@ -141,7 +147,7 @@ mod tests {
         assert_eq!(
             message("albedo=A"),
             "channel option `albedo=A`: unknown key `albedo`, expected one of radiance, \
-             hit_distance, normal, roughness, depth, motion, reference"
+             hit_distance, normal, roughness, depth, motion, hit_motion, reference"
         );
         assert_eq!(message("depth"), "channel option `depth`: expected key=name");
         assert_eq!(

@@ -32,6 +32,9 @@ pub struct Frame {
     /// Where the surface point was in the previous frame: uv now minus uv then, uv 0 to 1 from the
     /// top left.
     pub motion: Vec<[f32; 2]>,
+    /// World-space position, in metres, of what the reflection ray hit, minus the position of the same point in the
+    /// previous frame. `None` where it is not known.
+    pub hit_motion: Option<Vec<[f32; 3]>>,
     /// The expectation of `radiance`, from many samples.
     pub reference: Option<Vec<[f32; 3]>>,
 }

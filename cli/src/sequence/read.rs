@@ -83,15 +83,23 @@ impl Sequence {
         want("roughness", slice::from_ref(&names.roughness))?;
         want("depth", slice::from_ref(&names.depth))?;
         want("motion", &names.motion)?;
-        let may_lack_reference = names.reference == ChannelNames::default().reference;
-        if !may_lack_reference || names.reference.iter().any(|name| file.find(name).is_some()) {
-            want("reference", &names.reference)?;
-        }
+        let default = ChannelNames::default();
+        let mut want_if_there = |key, names: &[String; 3], default: &[String; 3]| {
+            let is_wanted = names != default || names.iter().any(|name| file.find(name).is_some());
+            if is_wanted { want(key, names).map(|()| true) } else { Ok(false) }
+        };
+        let has_hit_motion = want_if_there("hit_motion", &names.hit_motion, &default.hit_motion)?;
+        want_if_there("reference", &names.reference, &default.reference)?;
 
         let size = self.size();
         let planes = file.read(&wanted, size)?;
-        let [r, g, b, a, x, y, z, roughness, depth, u, v, truth @ ..] = &planes[..] else {
+        let [r, g, b, a, x, y, z, roughness, depth, u, v, rest @ ..] = &planes[..] else {
             unreachable!("there is one plane for each channel");
+        };
+        let (moved, truth) = rest.split_at(if has_hit_motion { 3 } else { 0 });
+        let vectors = |planes: &[Vec<f32>]| match planes {
+            [x, y, z] => Some(interleave([x, y, z])),
+            _ => None,
         };
         Ok(Frame {
             number: entry.number,
@@ -104,10 +112,8 @@ impl Sequence {
             roughness: roughness.clone(),
             depth: depth.clone(),
             motion: interleave([u, v]),
-            reference: match truth {
-                [r, g, b] => Some(interleave([r, g, b])),
-                _ => None,
-            },
+            hit_motion: vectors(moved),
+            reference: vectors(truth),
         })
     }
 }

@@ -62,6 +62,9 @@ fn frame(number: u32) -> Frame {
         roughness: (0..pixels).map(|i| value(i, 1) / 128.0).collect(),
         depth: (0..pixels).map(|i| value(i, 4) / 0.3).collect(),
         motion: (0..pixels).map(|i| [0, 1].map(|c| value(i, c) / -700.0)).collect(),
+        hit_motion: number
+            .is_multiple_of(3)
+            .then(|| (0..pixels).map(|i| [7, 2, 4].map(|c| value(i, c) / -64.0)).collect()),
         reference: (number > 0).then(|| (0..pixels).map(|i| [0, 1, 2].map(|c| value(i, c + 5))).collect()),
     }
 }
@@ -138,7 +141,7 @@ fn blender_passes(frame: &Frame) -> Vec<(&'static str, Vec<AnyChannel<FlatSample
 #[test]
 fn files_as_blender_writes_them_are_read() {
     let folder = Folder::new("blender");
-    let mut frame = frame(0);
+    let mut frame = Frame { hit_motion: None, ..frame(0) };
     write_sequence(&folder.0, "blender", 1.0, [&frame]).unwrap();
     // Channels stored as whole numbers.
     frame.roughness = (0..frame.pixels()).map(|i| i as f32).collect();
@@ -235,7 +238,7 @@ fn errors_name_file_field_and_channel() {
     assert_eq!(
         error.to_string(),
         format!(
-            "{}: no channel `truth.R` for reference; the file has Z, motion.X, motion.Y, normal.X, \
+            "{}: no channel `truth.R` for reference; the file has Z, hit_motion.X, hit_motion.Y, hit_motion.Z, motion.X, motion.Y, normal.X, \
              normal.Y, normal.Z, reflection.A, reflection.B, reflection.G, reflection.R, roughness; \
              name another one with reference=NAME",
             image.display()

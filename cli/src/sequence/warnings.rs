@@ -20,6 +20,8 @@ pub struct InputWarnings {
     pub depth: usize,
     /// Motion, xy.
     pub motion: usize,
+    /// Motion of what was hit, xyz.
+    pub hit_motion: usize,
     /// Reference, rgb.
     pub reference: usize,
 }
@@ -36,6 +38,7 @@ impl InputWarnings {
             roughness: count(frame.roughness.iter()),
             depth: count(frame.depth.iter()),
             motion: count(frame.motion.iter().flatten()),
+            hit_motion: count(frame.hit_motion.iter().flatten().flatten()),
             reference: count(frame.reference.iter().flatten().flatten()),
         }
     }
@@ -59,6 +62,7 @@ impl fmt::Display for InputWarnings {
             ("roughness", self.roughness),
             ("depth", self.depth),
             ("motion", self.motion),
+            ("hit_motion", self.hit_motion),
             ("reference", self.reference),
         ];
         let mut separator = " ";

@@ -66,6 +66,7 @@ pub fn write_sequence<F: Borrow<Frame>>(
 const CONVENTION: &str = "Matrices are row-major nested lists, applied to column vectors: \
     clip = proj * view * [world,1]. View space looks down -Z, +Y up; clip depth 0..1, NDC +Y up. \
     Z channel = -view_z, 0 = sky. motion = uv_current - uv_previous, uv origin top-left. \
+    hit_motion = world position of what was hit, current - previous. \
     jitter: pixels. reset: history is invalid at this frame.";
 
 #[derive(Serialize)]
@@ -125,6 +126,12 @@ fn write_frame(path: &Path, frame: &Frame) -> Result<(), SequenceError> {
         AnyChannel::new("motion.X", motion(0)),
         AnyChannel::new("motion.Y", motion(1)),
     ];
+    if let Some(hit_motion) = &frame.hit_motion {
+        check_pixels(path, "hit_motion", hit_motion.len(), size)?;
+        channels.push(half("hit_motion.X", hit_motion, 0));
+        channels.push(half("hit_motion.Y", hit_motion, 1));
+        channels.push(half("hit_motion.Z", hit_motion, 2));
+    }
     if let Some(reference) = &frame.reference {
         check_pixels(path, "reference", reference.len(), size)?;
         channels.push(half("reference.R", reference, 0));

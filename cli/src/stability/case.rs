@@ -215,6 +215,7 @@ impl Case {
             roughness: pixels.iter().map(|p| p.roughness).collect(),
             depth: pixels.iter().map(|p| p.depth).collect(),
             motion: pixels.iter().map(|p| p.motion).collect(),
+            hit_motion: None,
             reference: None,
         };
         (frame, exposure)

@@ -14,6 +14,7 @@ fn step(frame: &Frame) -> Step {
         roughness: frame.roughness[i],
         depth: frame.depth[i],
         motion: frame.motion[i],
+        hit_motion: frame.hit_motion.as_ref().map_or([0.0; 3], |motion| motion[i]),
     };
     let mut inputs = FrameInputs::new(frame.camera, frame.size);
     inputs.reset = frame.reset;

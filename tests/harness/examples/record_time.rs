@@ -34,6 +34,7 @@ fn with_ash(settings: &Settings, frame: &FrameInputs) -> Result<(f64, limpid_ash
         roughness: single.input(),
         depth: single.input(),
         motion: wide.input(),
+        hit_motion: None,
         environment: None,
         previous: None,
     };
@@ -76,6 +77,7 @@ fn with_wgpu(settings: &Settings, frame: &FrameInputs) -> Result<f64, Failure> {
         roughness: &view,
         depth: &view,
         motion: &view,
+        hit_motion: None,
         environment: None,
         previous: None,
     };

@@ -46,12 +46,20 @@ pub struct Pixel {
     pub depth: f32,
     /// `uv_now - uv_before`.
     pub motion: [f32; 2],
+    /// World-space motion of what was hit.
+    pub hit_motion: [f32; 3],
 }
 
 impl Pixel {
     /// A rough white wall, 4 units away, that faces a camera which looks along -z.
-    pub const WALL: Self =
-        Self { radiance: [1.0; 4], normal: [0.0, 0.0, 1.0], roughness: 0.5, depth: 4.0, motion: [0.0; 2] };
+    pub const WALL: Self = Self {
+        radiance: [1.0; 4],
+        normal: [0.0, 0.0, 1.0],
+        roughness: 0.5,
+        depth: 4.0,
+        motion: [0.0; 2],
+        hit_motion: [0.0; 3],
+    };
 }
 
 /// The caller's images of a frame.
@@ -107,12 +115,14 @@ impl Images {
         let image = |name, format, words| Image { name, format, size: self.size, words };
         let pixels = || self.pixels.iter();
         let normal = |p: &Pixel| [p.normal[0], p.normal[1], p.normal[2], 0.0].map(f32::to_bits);
+        let hit_motion = |p: &Pixel| [p.hit_motion[0], p.hit_motion[1], p.hit_motion[2], 0.0].map(f32::to_bits);
         vec![
             image("radiance", TexelFormat::Rgba16Float, pixels().flat_map(|p| half_words(p.radiance)).collect()),
             image("normal", TexelFormat::Rgba32Float, pixels().flat_map(normal).collect()),
             image("roughness", TexelFormat::R32Float, pixels().map(|p| p.roughness.to_bits()).collect()),
             image("depth", TexelFormat::R32Float, pixels().map(|p| p.depth.to_bits()).collect()),
             image("motion", TexelFormat::Rg32Float, pixels().flat_map(|p| p.motion.map(f32::to_bits)).collect()),
+            image("hit_motion", TexelFormat::Rgba32Float, pixels().flat_map(hit_motion).collect()),
             environment(),
         ]
     }

@@ -71,6 +71,7 @@ fn field(values: &'static [f32]) -> impl Strategy<Value = Field> {
 const RADIANCE: &[f32] =
     &[0.0, 0.5, 1.0, 3.0, 0.01, 1e-4, 6e-8, 1e-6, 100.0, 65504.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 const HIT_DISTANCE: &[f32] = &[1.0, 0.0, 0.01, 30.0, 10000.0, 65504.0, -1.0, f32::NAN, f32::INFINITY];
+const HIT_MOTION: &[f32] = &[0.0, 0.01, -0.2, 5.0, 1e30, 3e38, f32::NAN, f32::NEG_INFINITY];
 const DEPTH: &[f32] = &[4.0, 4.001, 1.0, 0.0, 0.1, 50.0, 1e4, 1e30, 3e38, 1e-30, -1.0, f32::NAN, f32::INFINITY];
 /// At and next to every threshold.
 const ROUGHNESS: &[f32] = &[
@@ -182,6 +183,8 @@ pub struct FrameSpec {
     pub normal_length: Field,
     /// Motion.
     pub motion: Motion,
+    /// Each component of the motion of what was hit.
+    pub hit_motion: Field,
     /// How far the camera moved to the right since the beginning.
     pub camera_shift: f32,
     /// How far it turned.
@@ -222,7 +225,7 @@ fn any_frame() -> impl Strategy<Value = FrameSpec> {
         field(ROUGHNESS),
         normals,
         prop_oneof![4 => Just(Field::Constant(1.0)), 1 => field(NORMAL_LENGTH)],
-        motion(),
+        (motion(), prop_oneof![Just(Field::Constant(0.0)), field(HIT_MOTION)]),
     );
     let camera = (
         prop_oneof![2 => Just(0.0f32), 1 => -0.5f32..0.5],
@@ -234,7 +237,7 @@ fn any_frame() -> impl Strategy<Value = FrameSpec> {
     );
     let resize = prop::option::weighted(0.08, (0.2f32..1.5, 0.2f32..1.5));
     ((share(), share()), 0u32..1000, images, camera, resize).prop_map(|(scale, seed, images, camera, resize)| {
-        let (radiance, hit_distance, depth, roughness, normals, normal_length, motion) = images;
+        let (radiance, hit_distance, depth, roughness, normals, normal_length, (motion, hit_motion)) = images;
         let (camera_shift, camera_turn, jitter, exposure, seconds, reset) = camera;
         FrameSpec {
             scale,
@@ -246,6 +249,7 @@ fn any_frame() -> impl Strategy<Value = FrameSpec> {
             normals,
             normal_length,
             motion,
+            hit_motion,
             camera_shift,
             camera_turn,
             jitter,
@@ -300,7 +304,7 @@ fn number_value(number: &'static Number) -> impl Strategy<Value = f32> {
 pub fn any_features() -> impl Strategy<Value = Features> {
     let roughness = prop::option::of(select(&[0.0f32, 0.01, 0.447_213_6, 1.0][..]));
     let near_taps = select(&[0u32, 1, 4, 12][..]);
-    (prop::array::uniform13(any::<bool>()), near_taps, roughness).prop_map(|(on, near_taps, constant_roughness)| {
+    (prop::array::uniform14(any::<bool>()), near_taps, roughness).prop_map(|(on, near_taps, constant_roughness)| {
         let mut features = Features::default();
         // One of the two has to be on.
         (features.mirror_parallax, features.surface_motion) = (on[0] || !on[1], on[1]);
@@ -308,6 +312,7 @@ pub fn any_features() -> impl Strategy<Value = Features> {
         (features.history_clip, features.average_mixing) = (on[5], on[6]);
         (features.light_change, features.outlier_spread, features.wide_filter) = (on[7], on[8], on[9]);
         (features.gbuffer_copy, features.packed_guide, features.block_statistics) = (on[10], on[11], on[12]);
+        features.hit_motion = on[13];
         (features.near_taps, features.constant_roughness) = (near_taps, constant_roughness);
         features
     })
@@ -429,6 +434,7 @@ impl FrameSpec {
             roughness: self.roughness.at(2, p, size),
             depth: self.depth.at(3, p, size),
             motion: self.motion.at(self.seed ^ 7, p, size).to_array(),
+            hit_motion: [8, 9, 10].map(|salt| self.hit_motion.at(self.seed ^ salt, p, size)),
         }
     }
 

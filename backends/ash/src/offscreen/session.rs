@@ -19,6 +19,8 @@ pub struct UploadedInputs<'a> {
     pub depth: &'a UploadedImage,
     /// Motion vectors in `rg`.
     pub motion: &'a UploadedImage,
+    /// World-space motion of what was hit, in `rgb`. Only for the feature `hit_motion`.
+    pub hit_motion: Option<&'a UploadedImage>,
     /// Equirectangular radiance. Only for `Fallback::Environment`.
     pub environment: Option<&'a UploadedImage>,
     /// Last frame's normal, roughness and depth. Only without the feature `gbuffer_copy`.
@@ -33,6 +35,7 @@ impl UploadedInputs<'_> {
             roughness: self.roughness.input(),
             depth: self.depth.input(),
             motion: self.motion.input(),
+            hit_motion: self.hit_motion.map(UploadedImage::input),
             environment: self.environment.map(UploadedImage::input),
             previous: self.previous.map(|images| {
                 let [normal, roughness, depth] = images.map(UploadedImage::input);

@@ -283,6 +283,7 @@ pub(crate) struct Images {
     pub(crate) roughness: wgpu::TextureView,
     pub(crate) depth: wgpu::TextureView,
     pub(crate) motion: wgpu::TextureView,
+    pub(crate) hit_motion: Option<wgpu::TextureView>,
     pub(crate) environment: Option<wgpu::TextureView>,
 }
 
@@ -294,6 +295,7 @@ impl Images {
             roughness: &self.roughness,
             depth: &self.depth,
             motion: &self.motion,
+            hit_motion: self.hit_motion.as_ref(),
             environment: self.environment.as_ref(),
             previous: None,
         }
@@ -351,6 +353,7 @@ impl Scene {
             roughness: gpu.upload(self.size, Rgba32Float, &each(&self.pixels, roughness)),
             depth: gpu.upload(self.size, R32Float, &each(&self.pixels, |p| p.depth)),
             motion: gpu.upload(self.size, Rg32Float, &each(&self.pixels, |p| p.motion.to_array())),
+            hit_motion: None,
             environment: None,
         }
     }

@@ -119,6 +119,7 @@ impl Executor for Ash {
             roughness: find("roughness"),
             depth: find("depth"),
             motion: find("motion"),
+            hit_motion: Some(find("hit_motion")),
             environment: Some(find("environment")),
             previous: Some(["prev_normal", "prev_roughness", "prev_depth"].map(find)),
         };

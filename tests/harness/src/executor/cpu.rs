@@ -96,6 +96,7 @@ impl Executor for Cpu {
             roughness: find("roughness"),
             depth: find("depth"),
             motion: find("motion"),
+            hit_motion: Some(find("hit_motion")),
             environment: Some(find("environment")),
             previous: Some(PrevGbuffer {
                 normal: find("prev_normal"),

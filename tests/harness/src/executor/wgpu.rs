@@ -120,6 +120,7 @@ impl Executor for Wgpu {
             roughness: find("roughness"),
             depth: find("depth"),
             motion: find("motion"),
+            hit_motion: Some(find("hit_motion")),
             environment: Some(find("environment")),
             previous: Some(PrevGbuffer {
                 normal: find("prev_normal"),
