@@ -47,8 +47,8 @@ pub(crate) struct PassTemplate {
 
 pub(crate) enum GridTemplate {
     One,
-    Tiles,
-    TileGroups,
+    /// A workgroup for each square of so many tiles a side.
+    Tiles(u32),
     /// A list of `args`.
     List(u64),
 }
@@ -60,13 +60,14 @@ const FILL: PassTemplate = PassTemplate {
     is_needed: always,
     stage: Stage::Denoise,
     grid: GridTemplate::List(1),
-    overrides: &["FALLBACK", "PREV_GUIDE_IS_KEPT"],
+    overrides: &["FALLBACK", "PREV_GUIDE_IS_KEPT", "GUIDE_IS_COMPLETE"],
     bindings: &[
         ("in_radiance", "radiance", Current),
         ("in_environment", "environment", Current),
         ("in_guide", "guide", Current),
         ("in_tiles", "tiles", Current),
         ("in_args", "args", Current),
+        ("out_guide", "guide", Current),
         ("out_prev_guide", "prev_guide", Current),
         ("out_output", OUTPUT, Current),
     ],
@@ -81,7 +82,7 @@ const PASSES: &[PassTemplate] = &[
         kernel: "classify",
         is_needed: always,
         stage: Stage::Classify,
-        grid: GridTemplate::Tiles,
+        grid: GridTemplate::Tiles(4),
         overrides: &[
             "NORMAL_ENCODING",
             "ROUGHNESS_CHANNEL",
@@ -89,6 +90,7 @@ const PASSES: &[PassTemplate] = &[
             "ROUGHNESS_IS_CONSTANT",
             "RAYS_PER_QUAD",
             "RAYS_FOLLOW_VARIANCE",
+            "GUIDE_IS_COMPLETE",
         ],
         bindings: &[
             ("in_normal", "normal", Current),
@@ -106,7 +108,7 @@ const PASSES: &[PassTemplate] = &[
         kernel: "list_tiles",
         is_needed: always,
         stage: Stage::Classify,
-        grid: GridTemplate::TileGroups,
+        grid: GridTemplate::Tiles(8),
         overrides: &["AVERAGE_IS_USED", "BLOCKS_ARE_USED", "LIGHT_CHANGE"],
         bindings: &[
             ("in_tile_flags", "tile_flags", Current),
@@ -153,7 +155,7 @@ const PASSES: &[PassTemplate] = &[
         kernel: "debug_view_published",
         is_needed: has_debug_view,
         stage: Stage::Denoise,
-        grid: GridTemplate::Tiles,
+        grid: GridTemplate::Tiles(1),
         overrides: &["VIEW", "MIRROR_PARALLAX", "SURFACE_MOTION", "HISTORY_SEARCH", "EDGE_REPAIR"],
         bindings: &[
             ("in_radiance", "radiance", Current),
@@ -283,7 +285,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "debug_view",
         is_needed: has_debug_view,
         stage: Stage::Denoise,
-        grid: GridTemplate::Tiles,
+        grid: GridTemplate::Tiles(1),
         overrides: &["VIEW", "MIRROR_PARALLAX", "SURFACE_MOTION", "OUTLIER_SPREAD"],
         bindings: &[
             ("in_radiance", "radiance", Current),
@@ -294,6 +296,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             ("in_blocks", BLOCKS, Current),
             ("in_samples", "samples", Current),
             ("in_accumulated", "history", Current),
+            ("in_tile_flags", "tile_flags", Current),
             ("out_debug_view", DEBUG_VIEW, Current),
         ],
     },
@@ -437,6 +440,10 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         "RAYS_FOLLOW_VARIANCE" => f64::from(ray_list.is_some_and(|list| list.variance_threshold.is_some())),
         "ROUGHNESS_IS_CONSTANT" => f64::from(features.constant_roughness.is_some()),
         "AVERAGE_IS_USED" => f64::from(settings.pipeline == Pipeline::Published && features.uses_average()),
+        // The published pipeline looks at last frame's surfaces, denoised or not.
+        "GUIDE_IS_COMPLETE" => {
+            f64::from(settings.pipeline == Pipeline::Published || settings.coverage.fallback == Fallback::Environment)
+        }
         "PREV_GUIDE_IS_KEPT" | "BLOCKS_ARE_USED" => f64::from(settings.pipeline == Pipeline::Footprint),
         // The template that names it means it.
         "ACCUMULATED" => 1.0,

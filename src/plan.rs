@@ -13,7 +13,7 @@ use crate::passes::{
     override_value, resource_of, templates,
 };
 use crate::resource::Copy::{self, Current, Previous};
-use crate::resource::{Access, Kind, Lifetime, Resource};
+use crate::resource::{Access, Kind, Lifetime, Resource, TILE_SIZE};
 use crate::settings::Settings;
 
 /// When in the frame a pass runs.
@@ -33,10 +33,11 @@ pub enum Stage {
 pub enum Grid {
     /// One.
     One,
-    /// One for each 8x8 tile of the frame's size.
-    Tiles,
-    /// One for each 8x8 tiles.
-    TileGroups,
+    /// One for each square of the frame's size.
+    Squares {
+        /// Pixels of its side.
+        side: u32,
+    },
     /// Three `u32` in a buffer, written on the GPU.
     Indirect {
         /// Name of the buffer.
@@ -146,8 +147,7 @@ fn plan_pass(template: &PassTemplate, settings: &Settings, sources: &Sources) ->
     }
     let grid = match template.grid {
         GridTemplate::One => Grid::One,
-        GridTemplate::Tiles => Grid::Tiles,
-        GridTemplate::TileGroups => Grid::TileGroups,
+        GridTemplate::Tiles(tiles) => Grid::Squares { side: tiles * TILE_SIZE },
         GridTemplate::List(index) => Grid::Indirect { resource: "args".to_owned(), offset: index * ARGS_STRIDE },
     };
     let (name, kernel_name) = (template.name.to_owned(), template.kernel.to_owned());
@@ -242,8 +242,7 @@ impl fmt::Display for Plan {
         for pass in &self.passes {
             let grid = match &pass.grid {
                 Grid::One => "one workgroup".to_owned(),
-                Grid::Tiles => "a workgroup per tile".to_owned(),
-                Grid::TileGroups => "a workgroup per 8x8 tiles".to_owned(),
+                Grid::Squares { side } => format!("a workgroup per {side}x{side} pixels"),
                 Grid::Indirect { resource, offset } => format!("indirect from {resource} + {offset}"),
             };
             writeln!(f, "{} ({:?}), {grid}", pass.name, pass.stage)?;
