@@ -4,8 +4,9 @@
 //! in   radiance   any float     full   input fallback only
 //! out  output     rgba16float   full   rgb: fallback radiance; a: 0
 //! out  prev_guide r32uint       full   0 (footprint pipeline, G-buffer copy)
+//! out  guide      rg32uint      full   0 beside tiles that are denoised, unless it is complete
 //!
-//! Grid: one 8x8 workgroup per left-out tile (indirect). Touches its own pixel only.
+//! Grid: one 8x8 workgroup per 16 left-out tiles (indirect), an invocation handles a pixel of each. Touches that only.
 
 import package::shared::frame;
 import package::shared::packing;
@@ -17,23 +18,16 @@ import package::shared::fallback;
 // Its copy for the next frame is the footprint pipeline's.
 override PREV_GUIDE_IS_KEPT: bool = false;
 
+// `classify` wrote the guide in tiles that are left out.
+override GUIDE_IS_COMPLETE: bool = true;
+
 @group(1) @binding(1) var<storage, read> in_tiles: array<u32>;
 @group(1) @binding(2) var<storage, read> in_args: array<vec4<u32>, 4>;
 @group(1) @binding(3) var out_output: texture_storage_2d<rgba16float, write>;
 @group(1) @binding(4) var out_prev_guide: texture_storage_2d<r32uint, write>;
+@group(1) @binding(5) var out_guide: texture_storage_2d<rg32uint, write>;
 
-@compute @workgroup_size(8, 8)
-fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let index = list_index(group);
-    if index >= in_args[1].w {
-        return;
-    }
-    let counts = tile_counts();
-    let tile = unpack_tile(in_tiles[counts.x * counts.y - 1u - index]);
-    let pixel = tile * TILE_SIZE + lane_position(lane);
-    if any(pixel >= frame.size) {
-        return;
-    }
+fn fill_pixel(pixel: vec2<u32>) {
     // Only the environment needs the surface.
     var guide: Guide;
     if FALLBACK == 2u {
@@ -42,5 +36,37 @@ fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     textureStore(out_output, pixel, rounded_to_half(vec4<f32>(fallback_radiance(pixel, guide), 0.0)));
     if PREV_GUIDE_IS_KEPT {
         textureStore(out_prev_guide, pixel, vec4<u32>(0u));
+    }
+}
+
+// An entry of the list of tiles that are left out.
+fn entry_at(index: u32) -> u32 {
+    let counts = tile_counts();
+    return in_tiles[counts.x * counts.y - 1u - index];
+}
+
+@compute @workgroup_size(8, 8)
+fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let first = list_index(group) * TILES_PER_GROUP;
+    let count = min(TILES_PER_GROUP, in_args[1].w - min(first, in_args[1].w));
+    // A bit for each tile beside one that is denoised, whose filters tap it.
+    var fringe = 0u;
+    for (var i = 0u; i < count; i++) {
+        let entry = entry_at(first + i);
+        fringe |= select(0u, 1u << i, (entry & TILE_IS_FRINGE) != 0u);
+        let pixel = unpack_tile(entry) * TILE_SIZE + lane_position(lane);
+        if all(pixel < frame.size) {
+            fill_pixel(pixel);
+        }
+    }
+    if !GUIDE_IS_COMPLETE {
+        for (var left = fringe; left != 0u; left &= left - 1u) {
+            let pixel = unpack_tile(entry_at(first + lowest_bit(left))) * TILE_SIZE + lane_position(lane);
+            if all(pixel < frame.size) {
+                if GUIDE_IS_PACKED {
+                    textureStore(out_guide, pixel, vec4<u32>(0u));
+                }
+            }
+        }
     }
 }

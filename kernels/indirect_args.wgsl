@@ -24,9 +24,9 @@ fn list_grid(groups: u32, length: u32) -> vec4<u32> {
 fn indirect_args() {
     let rays = inout_counters[2];
     out_args[0] = list_grid(inout_counters[0], inout_counters[0]);
-    out_args[1] = list_grid(inout_counters[1], inout_counters[1]);
+    out_args[1] = list_grid((inout_counters[1] + TILES_PER_GROUP - 1u) / TILES_PER_GROUP, inout_counters[1]);
     out_args[2] = list_grid((rays + RAY_GROUP_SIZE - 1u) / RAY_GROUP_SIZE, rays);
-    out_args[3] = list_grid((inout_counters[0] + TILES_PER_BLOCK_GROUP - 1u) / TILES_PER_BLOCK_GROUP, inout_counters[0]);
+    out_args[3] = list_grid((inout_counters[0] + TILES_PER_GROUP - 1u) / TILES_PER_GROUP, inout_counters[0]);
     inout_counters[0] = 0u;
     inout_counters[1] = 0u;
     inout_counters[2] = 0u;

@@ -3,7 +3,8 @@
 //!
 //! in      tile_flags             r32uint       tile    whether a pixel of the tile is denoised
 //! in/out  counters               4 x u32       listed tiles, left-out tiles
-//! out     tiles                  u32 list      listed tiles from the front, left-out tiles from the back
+//! out     tiles                  u32 list      listed tiles from the front; from the back left-out tiles, with a mark where
+//!                                              a neighbour is listed
 //! out     average                rgba16float   tile    0 in tiles that are left out (published pipeline)
 //! out     blocks, other_blocks   rgba32uint    block   the same (footprint pipeline)
 //! out     light                  r32uint       block   the same (light change)
@@ -53,6 +54,17 @@ fn clear_tile(tile: vec2<u32>) {
     }
 }
 
+// Whether one of the tiles around is listed.
+fn is_fringe(tile: vec2<u32>) -> bool {
+    let last = vec2<i32>(tile_counts()) - 1;
+    var found = 0u;
+    for (var i = 0; i < 9; i++) {
+        let at = clamp(vec2<i32>(tile) + vec2<i32>(i % 3, i / 3) - 1, vec2<i32>(0), last);
+        found |= textureLoad(in_tile_flags, at, 0).x;
+    }
+    return found != 0u;
+}
+
 @compute @workgroup_size(8, 8)
 fn list_tiles(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let tile = id.xy;
@@ -65,10 +77,12 @@ fn list_tiles(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invoc
     let is_listed = textureLoad(in_tile_flags, min(tile, counts - 1u), 0).x != 0u;
     let list = select(1u, 0u, is_listed);
     var index = 0u;
+    var packed = pack_tile(tile);
     if on_screen {
         index = atomicAdd(&group_counts[list], 1u);
         if !is_listed {
             clear_tile(tile);
+            packed |= select(0u, TILE_IS_FRINGE, is_fringe(tile));
         }
     }
     workgroupBarrier();
@@ -78,6 +92,6 @@ fn list_tiles(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invoc
     workgroupBarrier();
     if on_screen {
         index += group_first[list];
-        out_tiles[select(counts.x * counts.y - 1u - index, index, is_listed)] = pack_tile(tile);
+        out_tiles[select(counts.x * counts.y - 1u - index, index, is_listed)] = packed;
     }
 }

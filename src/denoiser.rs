@@ -7,7 +7,6 @@ use glam::UVec2;
 use crate::frame::{self, FrameConstants, FrameInputs, Previous};
 use crate::kernel::Kernel;
 use crate::plan::{Grid, Plan};
-use crate::resource::{Extent, TILE_SIZE};
 use crate::settings::Settings;
 use crate::variants::Variants;
 use crate::{Error, passes};
@@ -27,13 +26,9 @@ impl FrameSchedule {
     pub fn workgroups(&self, grid: &Grid) -> Option<[u32; 3]> {
         match grid {
             Grid::One => Some([1, 1, 1]),
-            Grid::Tiles => {
-                let tiles = Extent::Tile.of(UVec2::from_array(self.constants.size));
-                Some([tiles.x, tiles.y, 1])
-            }
-            Grid::TileGroups => {
-                let groups = (Extent::Tile.of(UVec2::from_array(self.constants.size)) + (TILE_SIZE - 1)) / TILE_SIZE;
-                Some([groups.x, groups.y, 1])
+            Grid::Squares { side } => {
+                let [width, height] = self.constants.size.map(|pixels| pixels.div_ceil(*side));
+                Some([width, height, 1])
             }
             Grid::Indirect { .. } => None,
         }

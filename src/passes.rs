@@ -69,8 +69,8 @@ pub(crate) struct PassTemplate {
 
 pub(crate) enum GridTemplate {
     One,
-    Tiles,
-    TileGroups,
+    /// A workgroup for each square of so many tiles a side.
+    Tiles(u32),
     /// A list of `args`.
     List(u64),
 }
@@ -82,12 +82,13 @@ const FILL: PassTemplate = PassTemplate {
     is_needed: always,
     stage: Stage::Denoise,
     grid: GridTemplate::List(1),
-    overrides: &["FALLBACK", "PREV_GUIDE_IS_KEPT"],
+    overrides: &["FALLBACK", "PREV_GUIDE_IS_KEPT", "GUIDE_IS_COMPLETE"],
     bindings: &[
         ("in_radiance", "radiance", Current),
         ("in_environment", "environment", Current),
         ("in_tiles", "tiles", Current),
         ("in_args", "args", Current),
+        ("out_guide", "guide", Current),
         ("out_prev_guide", "prev_guide", Current),
         ("out_output", OUTPUT, Current),
     ],
@@ -102,8 +103,8 @@ const PASSES: &[PassTemplate] = &[
         kernel: "classify",
         is_needed: always,
         stage: Stage::Classify,
-        grid: GridTemplate::Tiles,
-        overrides: &["RAYS_PER_QUAD", "RAYS_FOLLOW_VARIANCE"],
+        grid: GridTemplate::Tiles(4),
+        overrides: &["RAYS_PER_QUAD", "RAYS_FOLLOW_VARIANCE", "GUIDE_IS_COMPLETE"],
         bindings: &[
             ("in_history", LAST_OUTPUT, Current),
             ("out_guide", "guide", Current),
@@ -117,7 +118,7 @@ const PASSES: &[PassTemplate] = &[
         kernel: "list_tiles",
         is_needed: always,
         stage: Stage::Classify,
-        grid: GridTemplate::TileGroups,
+        grid: GridTemplate::Tiles(8),
         overrides: &["AVERAGE_IS_USED", "BLOCKS_ARE_USED", "LIGHT_CHANGE"],
         bindings: &[
             ("in_tile_flags", "tile_flags", Current),
@@ -163,7 +164,7 @@ const PASSES: &[PassTemplate] = &[
         kernel: "debug_view_published",
         is_needed: has_debug_view,
         stage: Stage::Denoise,
-        grid: GridTemplate::Tiles,
+        grid: GridTemplate::Tiles(1),
         overrides: &["VIEW", "MIRROR_PARALLAX", "SURFACE_MOTION", "HISTORY_SEARCH", "EDGE_REPAIR"],
         bindings: &[
             ("in_radiance", "radiance", Current),
@@ -297,7 +298,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "debug_view",
         is_needed: has_debug_view,
         stage: Stage::Denoise,
-        grid: GridTemplate::Tiles,
+        grid: GridTemplate::Tiles(1),
         overrides: &["VIEW", "MIRROR_PARALLAX", "SURFACE_MOTION", "HIT_MOTION", "OUTLIER_SPREAD", "BLOCK_STATISTICS"],
         bindings: &[
             ("in_radiance", "radiance", Current),
@@ -308,6 +309,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             ("in_blocks", BLOCKS, Current),
             ("in_samples", "samples", Current),
             ("in_accumulated", "history", Current),
+            ("in_tile_flags", "tile_flags", Current),
             ("out_debug_view", DEBUG_VIEW, Current),
         ],
     },
@@ -468,6 +470,10 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         "BLOCKS_ARE_USED" => {
             let has_blocks = has_input_blocks(settings) || has_wide_filter(settings);
             f64::from(settings.pipeline == Pipeline::Footprint && has_blocks)
+        }
+        // The published pipeline looks at last frame's surfaces, denoised or not.
+        "GUIDE_IS_COMPLETE" => {
+            f64::from(settings.pipeline == Pipeline::Published || settings.coverage.fallback == Fallback::Environment)
         }
         // The template that names it means it.
         "ACCUMULATED" => 1.0,

@@ -14,7 +14,7 @@ use crate::passes::{
     SHARED_BINDINGS, all_resources, override_value, resource_of, templates,
 };
 use crate::resource::Copy::{self, Previous};
-use crate::resource::{Access, Kind, Lifetime, Resource};
+use crate::resource::{Access, Kind, Lifetime, Resource, TILE_SIZE};
 use crate::settings::Settings;
 use crate::variants::Variants;
 
@@ -35,10 +35,11 @@ pub enum Stage {
 pub enum Grid {
     /// One.
     One,
-    /// One for each 8x8 tile of the frame's size.
-    Tiles,
-    /// One for each 8x8 tiles.
-    TileGroups,
+    /// One for each square of the frame's size.
+    Squares {
+        /// Pixels of its side.
+        side: u32,
+    },
     /// Three `u32` in a buffer, written on the GPU.
     Indirect {
         /// Name of the buffer.
@@ -156,8 +157,7 @@ fn plan_pass<K: AsRef<Kernel>>(
     }
     let grid = match template.grid {
         GridTemplate::One => Grid::One,
-        GridTemplate::Tiles => Grid::Tiles,
-        GridTemplate::TileGroups => Grid::TileGroups,
+        GridTemplate::Tiles(tiles) => Grid::Squares { side: tiles * TILE_SIZE },
         GridTemplate::List(index) => Grid::Indirect { resource: "args".to_owned(), offset: index * ARGS_STRIDE },
     };
     let (name, kernel_name) = (template.name.to_owned(), template.kernel.to_owned());
@@ -283,8 +283,7 @@ impl fmt::Display for Plan {
         for pass in &self.passes {
             let grid = match &pass.grid {
                 Grid::One => "one workgroup".to_owned(),
-                Grid::Tiles => "a workgroup per tile".to_owned(),
-                Grid::TileGroups => "a workgroup per 8x8 tiles".to_owned(),
+                Grid::Squares { side } => format!("a workgroup per {side}x{side} pixels"),
                 Grid::Indirect { resource, offset } => format!("indirect from {resource} + {offset}"),
             };
             writeln!(f, "{} ({:?}), {grid}", pass.name, pass.stage)?;

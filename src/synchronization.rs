@@ -195,7 +195,7 @@ impl Plan {
         let bound = pass.bindings.iter().map(|b| (b.resource.as_str(), b.copy, Usage::Kernel(b.access)));
         let indirect = match &pass.grid {
             Grid::Indirect { resource, .. } => Some((resource.as_str(), Copy::Current, Usage::Indirect)),
-            Grid::One | Grid::Tiles | Grid::TileGroups => None,
+            Grid::One | Grid::Squares { .. } => None,
         };
         bound.chain(indirect).filter_map(|(name, copy, usage)| {
             let is_own = |resource: &Resource| resource.name == name && resource.lifetime != Lifetime::External;

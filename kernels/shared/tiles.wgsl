@@ -6,20 +6,29 @@ const TILE_SIZE: u32 = 8u;
 // Workgroups per row of an indirect grid, so that no dimension passes 65535. `limpid::plan` has the same number.
 const LIST_GRID_WIDTH: u32 = 4096u;
 
+// Index of the lowest bit that is set: for loops over bits.
+fn lowest_bit(bits: u32) -> u32 {
+    return countOneBits(~bits & (bits - 1u));
+}
+
 fn tile_counts() -> vec2<u32> {
     return (frame.size + (TILE_SIZE - 1u)) / TILE_SIZE;
 }
+
+// Set in the list of tiles that are left out where a neighbour is denoised.
+const TILE_IS_FRINGE: u32 = 0x80000000u;
 
 fn pack_tile(tile: vec2<u32>) -> u32 {
     return tile.x | (tile.y << 16u);
 }
 
 fn unpack_tile(packed: u32) -> vec2<u32> {
-    return vec2<u32>(packed & 0xffffu, packed >> 16u);
+    return vec2<u32>(packed & 0xffffu, (packed & ~TILE_IS_FRINGE) >> 16u);
 }
 
-// Tiles that a workgroup of 64 invocations handles, each of which handles a block of 4x4 pixels.
-const TILES_PER_BLOCK_GROUP: u32 = 16u;
+// Tiles of their list that a workgroup of 64 invocations handles in `fill` and in passes over blocks of 4x4 pixels, in
+// which an invocation handles a block.
+const TILES_PER_GROUP: u32 = 16u;
 
 // Position in its list that a workgroup of an indirect grid handles.
 fn list_index(group: vec3<u32>) -> u32 {
@@ -33,7 +42,7 @@ fn lane_position(lane: u32) -> vec2<u32> {
 
 // Position in its list of the tile that an invocation handles a block of.
 fn block_list_index(group: vec3<u32>, lane: u32) -> u32 {
-    return list_index(group) * TILES_PER_BLOCK_GROUP + lane / 4u;
+    return list_index(group) * TILES_PER_GROUP + lane / 4u;
 }
 
 // That block of the tile.

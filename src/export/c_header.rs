@@ -224,17 +224,16 @@ impl Export<'_> {
                 .collect();
             let table = format!("limpid_{}_bindings", pass.name);
             text += &format!("static const LimpidBinding {table}[{}] = {{\n{bindings}}};\n\n", pass.bindings.len());
-            let (grid, resource, offset) = match &pass.grid {
-                Grid::One => ("ONE", "-1".to_owned(), 0),
-                Grid::Tiles => ("TILES", "-1".to_owned(), 0),
-                Grid::TileGroups => ("TILE_GROUPS", "-1".to_owned(), 0),
+            let (grid, side, resource, offset) = match &pass.grid {
+                Grid::One => ("ONE", 0, "-1".to_owned(), 0),
+                Grid::Squares { side } => ("SQUARES", *side, "-1".to_owned(), 0),
                 Grid::Indirect { resource, offset } => {
-                    ("INDIRECT", format!("LIMPID_RESOURCE_{}", upper(resource)), *offset)
+                    ("INDIRECT", 0, format!("LIMPID_RESOURCE_{}", upper(resource)), *offset)
                 }
             };
             let stage = if pass.stage == Stage::Classify { "CLASSIFY" } else { "DENOISE" };
             rows += &format!(
-                "    {{\"{}\", LIMPID_STAGE_{stage}, LIMPID_GRID_{grid}, {resource}, {offset}, {}, {table}, {}}},\n",
+                "    {{\"{}\", LIMPID_STAGE_{stage}, LIMPID_GRID_{grid}, {side}, {resource}, {offset}, {}, {table}, {}}},\n",
                 pass.name,
                 u8::from(barrier.is_some()),
                 pass.bindings.len(),

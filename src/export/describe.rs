@@ -144,9 +144,11 @@ impl Export<'_> {
             overrides: pass.overrides.clone(),
             workgroup_size: kernel.workgroup_size,
             grid: match &pass.grid {
-                Grid::One => GridEntry::Direct { x: "1", y: "1", z: "1" },
-                Grid::Tiles => GridEntry::Direct { x: "(width + 7) / 8", y: "(height + 7) / 8", z: "1" },
-                Grid::TileGroups => GridEntry::Direct { x: "(width + 63) / 64", y: "(height + 63) / 64", z: "1" },
+                Grid::One => GridEntry::Direct { x: "1".to_owned(), y: "1".to_owned(), z: "1".to_owned() },
+                Grid::Squares { side } => {
+                    let squares = |pixels| format!("({pixels} + {}) / {side}", side - 1);
+                    GridEntry::Direct { x: squares("width"), y: squares("height"), z: "1".to_owned() }
+                }
                 Grid::Indirect { resource, offset } => {
                     GridEntry::Indirect { resource: resource.clone(), offset: *offset }
                 }

@@ -266,7 +266,7 @@ fn slot(binding: &BindingEntry, target: Target) -> (String, String) {
 
 fn pass_section(pass: &PassEntry, target: Target, words: &Words) -> String {
     let grid = match &pass.grid {
-        GridEntry::Direct { x: "1", y: "1", .. } => "One workgroup.".to_owned(),
+        GridEntry::Direct { x, y, .. } if x == "1" && y == "1" => "One workgroup.".to_owned(),
         GridEntry::Direct { x, y, z } => {
             format!("`{x}` x `{y}` x `{z}` workgroups, of the frame's own width and height.")
         }

@@ -160,11 +160,11 @@ pub enum GridEntry {
     /// Counts, expressions of the **frame's** width and height.
     Direct {
         /// In x.
-        x: &'static str,
+        x: String,
         /// In y.
-        y: &'static str,
+        y: String,
         /// In z.
-        z: &'static str,
+        z: String,
     },
     /// Three `u32` in a buffer.
     Indirect {

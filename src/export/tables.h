@@ -3,7 +3,7 @@ enum { LIMPID_EXTERNAL, LIMPID_PERSISTENT, LIMPID_TRANSIENT };
 enum { LIMPID_EXTENT_FULL, LIMPID_EXTENT_BLOCK, LIMPID_EXTENT_TILE };
 enum { LIMPID_READ, LIMPID_WRITE, LIMPID_READ_WRITE };
 enum { LIMPID_STAGE_CLASSIFY, LIMPID_STAGE_DENOISE };
-enum { LIMPID_GRID_ONE, LIMPID_GRID_TILES, LIMPID_GRID_TILE_GROUPS, LIMPID_GRID_INDIRECT };
+enum { LIMPID_GRID_ONE, LIMPID_GRID_SQUARES, LIMPID_GRID_INDIRECT };
 
 typedef struct LimpidResource {
     const char *name;
@@ -28,7 +28,8 @@ typedef struct LimpidBinding {
 typedef struct LimpidPass {
     const char *name;    /* of file and entry point */
     int stage;           /* before or after the renderer traces rays */
-    int grid;            /* LIMPID_GRID_: one workgroup, one a tile, one for 8x8 tiles, or indirect */
+    int grid;            /* LIMPID_GRID_: one workgroup, one for each square of the frame, or indirect */
+    uint32_t grid_side;  /* pixels of the side of a square */
     int grid_resource;   /* buffer with the grid */
     uint32_t grid_offset;
     int barrier;         /* 1: needs a barrier on all memory before it */
@@ -53,8 +54,7 @@ static inline void limpid_extent(const LimpidResource *resource, uint32_t width,
 /* Workgroups of a pass that is not indirect, for a frame of width x height pixels. */
 static inline void limpid_grid(const LimpidPass *pass, uint32_t width, uint32_t height, uint32_t out[3]) {
     const int is_one = pass->grid == LIMPID_GRID_ONE;
-    const uint32_t side = pass->grid == LIMPID_GRID_TILE_GROUPS ? 8u * LIMPID_TILE_SIZE : LIMPID_TILE_SIZE;
-    out[0] = is_one ? 1u : limpid_squares(width, side);
-    out[1] = is_one ? 1u : limpid_squares(height, side);
+    out[0] = is_one ? 1u : limpid_squares(width, pass->grid_side);
+    out[1] = is_one ? 1u : limpid_squares(height, pass->grid_side);
     out[2] = 1u;
 }

@@ -15,7 +15,7 @@ int main(void) {
     uint32_t extent[2], grid[3];
     limpid_extent(&limpid_resources[LIMPID_RESOURCE_TILES], 1920, 1080, extent);
     limpid_grid(&limpid_passes[LIMPID_PASS_CLASSIFY], 1920, 1080, grid);
-    if (extent[0] != 240 || extent[1] != 135 || grid[0] != 240 || grid[1] != 135 || grid[2] != 1) {
+    if (extent[0] != 240 || extent[1] != 135 || grid[0] != 60 || grid[1] != 34 || grid[2] != 1) {
         return 3;
     }
     limpid_extent(&limpid_resources[LIMPID_RESOURCE_BLOCKS], 1921, 1080, extent);

@@ -283,6 +283,10 @@ impl Language for GlslOptions {
             // GLSL has it for floats alone.
             M::Dot if is_integer(operands[0].ty) => return None,
             M::Fma => "fma",
+            // A signed number there.
+            M::CountOneBits if *operands[0].ty == TypeInner::Scalar(Scalar::U32) => {
+                return Some((call("uint", &[&call("bitCount", &texts).text]), None));
+            }
             M::Pack2x16float => "packHalf2x16",
             M::Unpack2x16float => "unpackHalf2x16",
             M::Pack2x16snorm => "packSnorm2x16",

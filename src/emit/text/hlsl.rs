@@ -364,6 +364,7 @@ impl Language for HlslOptions {
             M::Atan2 => "atan2",
             M::Round => "round",
             M::Fma => "mad",
+            M::CountOneBits => "countbits",
             _ => helper.or_else(|| super::language::common_function(fun))?,
         };
         let texts: Vec<_> = operands.iter().map(|operand| operand.text.text.as_str()).collect();

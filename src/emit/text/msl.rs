@@ -207,6 +207,7 @@ impl Language for MslOptions {
             M::Atan2 => "atan2",
             M::Round => "rint",
             M::Fma => "fma",
+            M::CountOneBits => "popcount",
             M::Pack2x16snorm => "pack_float_to_snorm2x16",
             M::Unpack2x16snorm => "unpack_snorm2x16_to_float",
             _ => helper.or_else(|| common_function(fun))?,

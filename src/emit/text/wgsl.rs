@@ -221,6 +221,7 @@ impl Language for WgslOptions {
             M::Atan2 => "atan2",
             M::Round => "round",
             M::Fma => "fma",
+            M::CountOneBits => "countOneBits",
             M::Pack2x16float => "pack2x16float",
             M::Unpack2x16float => "unpack2x16float",
             M::Pack2x16snorm => "pack2x16snorm",
