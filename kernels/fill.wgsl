@@ -45,6 +45,16 @@ fn entry_at(index: u32) -> u32 {
     return in_tiles[counts.x * counts.y - 1u - index];
 }
 
+// Writes guides of pixels that are left out into the tiles of a workgroup that `fringe` has bits of.
+fn clear_guides(first: u32, fringe: u32, lane: u32) {
+    for (var left = fringe; left != 0u; left &= left - 1u) {
+        let pixel = unpack_tile(entry_at(first + lowest_bit(left))) * TILE_SIZE + lane_position(lane);
+        if all(pixel < frame.size) {
+            textureStore(out_guide, pixel, vec4<u32>(0u));
+        }
+    }
+}
+
 @compute @workgroup_size(8, 8)
 fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let first = list_index(group) * TILES_PER_GROUP;
@@ -60,13 +70,8 @@ fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
         }
     }
     if !GUIDE_IS_COMPLETE {
-        for (var left = fringe; left != 0u; left &= left - 1u) {
-            let pixel = unpack_tile(entry_at(first + lowest_bit(left))) * TILE_SIZE + lane_position(lane);
-            if all(pixel < frame.size) {
-                if GUIDE_IS_PACKED {
-                    textureStore(out_guide, pixel, vec4<u32>(0u));
-                }
-            }
+        if GUIDE_IS_PACKED {
+            clear_guides(first, fringe, lane);
         }
     }
 }
