@@ -16,7 +16,6 @@ import package::shared::fallback;
 
 // The G-buffer is kept for the next frame.
 override PREV_GUIDE_IS_KEPT: bool = false;
-
 // `classify` wrote the guide in tiles that are left out.
 override GUIDE_IS_COMPLETE: bool = true;
 
