@@ -11,7 +11,7 @@
 //! out  counters     4 x u32       rays (ray list only)
 //!
 //! Grid: 8x8 invocations for each 4x4 tiles, each of which handles a pixel of every tile: about 20 bytes in, 8 out a pixel.
-//! Where tiles are left out, 4 to 8 bytes in, unless the guide is needed there too.
+//! Where depth shows no surface, depth alone, unless the guide is needed there too.
 //! After: tile classification of the AMD FidelityFX denoiser 1.2 (2021). Differs: one ray per quad goes to the
 //! first pixel that needs one, where the original traces none if the top left pixel needs none.
 

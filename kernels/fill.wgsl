@@ -17,7 +17,6 @@ import package::shared::fallback;
 
 // Its copy for the next frame is the footprint pipeline's.
 override PREV_GUIDE_IS_KEPT: bool = false;
-
 // `classify` wrote the guide in tiles that are left out.
 override GUIDE_IS_COMPLETE: bool = true;
 
