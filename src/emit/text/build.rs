@@ -290,6 +290,7 @@ impl Builder<'_> {
             }
             &Statement::Atomic { pointer, fun, value, result } => {
                 let writes = self.place(pointer).into_iter().collect();
+                let result = result.filter(|result| self.uses.contains_key(result));
                 let node = Node::Atomic { pointer, fun, value, result };
                 self.outline.named.extend(result);
                 self.act(node, &[pointer, value], writes, span, lines);
