@@ -20,9 +20,9 @@ fn history_grows_by_a_frame_up_to_the_cap_of_its_roughness() {
     let size = UVec2::new(24, 16);
     // Columns of tiles: GGX alpha 0, 0.01 and 0.64.
     let published = [8.0, 32.0 * (1.0 - (-1.0f32).exp()), 32.0];
-    // History is of so many frames, to which this one is added; of two thirds of the way to the roughness from
-    // which on it may be longest, the smooth step is 20 / 27. No more than 31 are stored.
-    let footprint = [9.0, 9.0 + 23.0 * 20.0 / 27.0, 31.0];
+    // History is of 0.13 to 0.5 seconds of 60 frames each, and this frame is added; of two thirds of the way to the
+    // roughness from which on it may be longest, the smooth step is 20 / 27.
+    let footprint = [8.8, 8.8 + 22.2 * 20.0 / 27.0, 31.0];
     for (settings, caps, tolerance) in [(published_settings(), published, 0.2), (linear_settings(), footprint, 0.7)] {
         assert_grows(Run::new(&gpu, &settings, size), size, caps, tolerance);
     }
