@@ -1,25 +1,14 @@
 //! The motion of what was hit leads to where its reflection was, and does nothing else.
 
-use std::cell::{Cell, RefCell};
+use std::cell::Cell;
 
 use glam::{DMat4, DQuat, DVec2, DVec3, UVec2};
 use limpid::{FrameInputs, Settings};
 use limpid_harness::strategy::{Spec, any_spec, noise};
-use limpid_harness::{Case, Change, Executor, Images, Pixel, Snapshot, Step, fastest, runner};
+use limpid_harness::{Case, Change, Executor, Images, Pixel, Snapshot, Step, for_all};
 use proptest::prelude::*;
 
 const SIZE: UVec2 = UVec2::new(64, 40);
-
-/// Runs a property on many values with one executor.
-fn for_all<S: Strategy>(
-    cases: u32,
-    strategy: S,
-    property: impl Fn(&mut dyn Executor, S::Value) -> Result<(), TestCaseError>,
-) {
-    let executor = RefCell::new(fastest());
-    let (mut runner, _) = runner(file!(), cases);
-    runner.run(&strategy, |value| property(executor.borrow_mut().as_mut(), value)).unwrap();
-}
 
 /// A camera of the harness that was turned and moved, in 64 bits.
 #[derive(Debug, Clone, Copy)]
@@ -169,7 +158,7 @@ fn history_of_a_flat_mirror_is_found_where_the_moved_thing_was_reflected() {
             }
             Ok(())
         };
-    for_all(24, (any_view(), 0.1f64..2.0, motion), property);
+    for_all(file!(), 24, (any_view(), 0.1f64..2.0, motion), property);
     // A mirror that is seen at grazing angles may fail the tests of its plane in some places.
     assert!(in_view.get() > 5000 && found.get() > in_view.get() / 100 * 98, "{} of {}", found.get(), in_view.get());
 }
@@ -205,7 +194,7 @@ fn what_rests_is_found_as_without_the_feature() {
         set(&mut spec, false);
         is_same(&with, &run(&spec))
     };
-    for_all(16, any_spec(), property);
+    for_all(file!(), 16, any_spec(), property);
 }
 
 #[test]
@@ -226,5 +215,5 @@ fn motion_that_is_no_number_counts_as_none() {
         };
         is_same(&run(&|motion| motion[component] = bad), &run(&|motion| *motion = [0.0; 3]))
     };
-    for_all(16, (any_spec(), bad, 0usize..3), property);
+    for_all(file!(), 16, (any_spec(), bad, 0usize..3), property);
 }

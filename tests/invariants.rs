@@ -1,31 +1,15 @@
 //! What must hold whatever the backend, on the fastest one there is.
 
-use std::cell::RefCell;
-
 use glam::{Mat4, UVec2, Vec3};
 use limpid::Preset;
 use limpid::settings::{DepthEncoding, Fallback, Pipeline};
 use limpid_harness::executor::Cpu;
 use limpid_harness::strategy::{any_spec, noise};
-use limpid_harness::{Case, Executor, Images, Pixel, Snapshot, Step, fastest, runner};
+use limpid_harness::{Case, Executor, Images, Pixel, Snapshot, Step, for_all, runner};
 use proptest::prelude::*;
 
 /// One rounding of a half float, relative.
 const HALF_STEP: f32 = 1.0 / 1024.0;
-
-/// Runs a property on many values with one executor.
-fn for_all<S: Strategy>(
-    cases: u32,
-    strategy: S,
-    property: impl Fn(&mut dyn Executor, S::Value) -> Result<(), TestCaseError>,
-) {
-    let executor = RefCell::new(fastest());
-    let (mut runner, _) = runner(file!(), cases);
-    let result = runner.run(&strategy, |value| property(executor.borrow_mut().as_mut(), value));
-    if let Err(error) = result {
-        panic!("{error}");
-    }
-}
 
 /// A still scene of some size, roughness and noise seed.
 fn any_still() -> impl Strategy<Value = (UVec2, f32, u32)> {
@@ -40,31 +24,36 @@ fn last_output(run: &[Snapshot]) -> Vec<[f32; 4]> {
 #[test]
 fn constant_radiance_stays_what_it_is() {
     let radiance = prop::array::uniform3(0.0f32..100.0);
-    for_all(24, (any_still(), radiance, any::<bool>()), |executor, ((size, roughness, _), radiance, is_reference)| {
-        let [r, g, b] = radiance;
-        let mut case = Case::still(size, 4, |_, _| Pixel { radiance: [r, g, b, 3.0], roughness, ..Pixel::WALL });
-        if is_reference {
-            case.settings = Preset::Reference.settings();
-            case.settings.conventions.depth = DepthEncoding::Linear;
-        }
-        for output in case.run(executor).iter().map(Snapshot::output) {
-            for texel in output {
-                for (out, expected) in texel.into_iter().zip(radiance) {
-                    // Rounded when it is stored as input, history, average and output, and by the clip's floor; blocks
-                    // keep 9 bits of the largest of the three.
-                    let block = if is_reference { 0.0 } else { r.max(g).max(b) / 512.0 };
-                    let allowed = 4.0 * HALF_STEP * expected + 0.0011 + block;
-                    prop_assert!((out - expected).abs() <= allowed, "{} became {}", expected, out);
+    for_all(
+        file!(),
+        24,
+        (any_still(), radiance, any::<bool>()),
+        |executor, ((size, roughness, _), radiance, is_reference)| {
+            let [r, g, b] = radiance;
+            let mut case = Case::still(size, 4, |_, _| Pixel { radiance: [r, g, b, 3.0], roughness, ..Pixel::WALL });
+            if is_reference {
+                case.settings = Preset::Reference.settings();
+                case.settings.conventions.depth = DepthEncoding::Linear;
+            }
+            for output in case.run(executor).iter().map(Snapshot::output) {
+                for texel in output {
+                    for (out, expected) in texel.into_iter().zip(radiance) {
+                        // Rounded when it is stored as input, history, average and output, and by the clip's floor; blocks
+                        // keep 9 bits of the largest of the three.
+                        let block = if is_reference { 0.0 } else { r.max(g).max(b) / 512.0 };
+                        let allowed = 4.0 * HALF_STEP * expected + 0.0011 + block;
+                        prop_assert!((out - expected).abs() <= allowed, "{} became {}", expected, out);
+                    }
                 }
             }
-        }
-        Ok(())
-    });
+            Ok(())
+        },
+    );
 }
 
 #[test]
 fn brightness_and_exposure_cancel() {
-    for_all(16, (any_still(), -6i32..=6), |executor, ((size, roughness, seed), stops)| {
+    for_all(file!(), 16, (any_still(), -6i32..=6), |executor, ((size, roughness, seed), stops)| {
         let factor = 2.0f32.powi(stops);
         let case = |factor: f32| {
             let mut case = Case::still(size, 4, |frame, p| {
@@ -87,32 +76,37 @@ fn brightness_and_exposure_cancel() {
 
 #[test]
 fn world_units_do_not_matter() {
-    for_all(16, (any_still(), -12i32..=12, -0.2f32..0.2), |executor, ((size, roughness, seed), exponent, step)| {
-        let unit = 2.0f32.powi(exponent);
-        let case = |unit: f32| {
-            let mut case = Case::still(size, 4, |frame, p| Pixel {
-                radiance: [noise(seed + frame, p), 0.5, 1.0, unit * (1.0 + noise(seed, p))],
-                roughness,
-                depth: unit * (4.0 + 0.1 * noise(7, p)),
-                ..Pixel::WALL
-            });
-            for (frame, frame_step) in case.steps.iter_mut().enumerate() {
-                let moved = Vec3::new(step * frame as f32, 0.0, -0.5 * step) * unit;
-                frame_step.frame.camera.world_to_view = Mat4::from_translation(moved);
-            }
-            case
-        };
-        // A power of two changes no digit.
-        prop_assert_eq!(last_output(&case(1.0).run(executor)), last_output(&case(unit).run(executor)));
-        Ok(())
-    });
+    for_all(
+        file!(),
+        16,
+        (any_still(), -12i32..=12, -0.2f32..0.2),
+        |executor, ((size, roughness, seed), exponent, step)| {
+            let unit = 2.0f32.powi(exponent);
+            let case = |unit: f32| {
+                let mut case = Case::still(size, 4, |frame, p| Pixel {
+                    radiance: [noise(seed + frame, p), 0.5, 1.0, unit * (1.0 + noise(seed, p))],
+                    roughness,
+                    depth: unit * (4.0 + 0.1 * noise(7, p)),
+                    ..Pixel::WALL
+                });
+                for (frame, frame_step) in case.steps.iter_mut().enumerate() {
+                    let moved = Vec3::new(step * frame as f32, 0.0, -0.5 * step) * unit;
+                    frame_step.frame.camera.world_to_view = Mat4::from_translation(moved);
+                }
+                case
+            };
+            // A power of two changes no digit.
+            prop_assert_eq!(last_output(&case(1.0).run(executor)), last_output(&case(unit).run(executor)));
+            Ok(())
+        },
+    );
 }
 
 /// Radiance that jumps, seen at two frame rates, is as far on its way after the same time.
 #[test]
 fn frame_rates_do_not_matter() {
     let any = (0.05f32..1.0, 0.0f32..4.0, 10u32..=60, 10u32..=60, 0.1f32..0.6);
-    for_all(16, any, |executor, (roughness, after, slow, fast, time)| {
+    for_all(file!(), 16, any, |executor, (roughness, after, slow, fast, time)| {
         let mut reached = |rate: u32| {
             // History is as long as it gets after half a second.
             let before = rate;
@@ -137,32 +131,37 @@ fn frame_rates_do_not_matter() {
 #[test]
 fn resolution_does_not_matter() {
     let sizes = (32u32..80, 16u32..40).prop_map(UVec2::from);
-    for_all(16, (sizes, 0.7f32..1.0, 0.5f32..4.0, 0.3f32..0.7), |executor, (size, roughness, distance, edge)| {
-        let edge = (edge * size.x as f32) as u32;
-        let mut run = |scale: u32| {
-            let case = Case::still(scale * size, 6, |_, p| {
-                let value = if p.x < scale * edge { 0.1 } else { 1.0 };
-                Pixel { radiance: [value, value, value, distance], roughness, ..Pixel::WALL }
-            });
-            last_output(&case.run(executor))
-        };
-        let (coarse, fine) = (run(1), run(2));
-        let mut difference = 0.0;
-        for (index, texel) in coarse.iter().enumerate() {
-            let (x, y) = (2 * (index as u32 % size.x), 2 * (index as u32 / size.x));
-            let at = |dx: u32, dy: u32| fine[((y + dy) * 2 * size.x + x + dx) as usize][0];
-            let mean = (at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1)) / 4.0;
-            difference += (mean - texel[0]).abs() / coarse.len() as f32;
-        }
-        prop_assert!(difference <= 0.015, "{}", difference);
-        Ok(())
-    });
+    for_all(
+        file!(),
+        16,
+        (sizes, 0.7f32..1.0, 0.5f32..4.0, 0.3f32..0.7),
+        |executor, (size, roughness, distance, edge)| {
+            let edge = (edge * size.x as f32) as u32;
+            let mut run = |scale: u32| {
+                let case = Case::still(scale * size, 6, |_, p| {
+                    let value = if p.x < scale * edge { 0.1 } else { 1.0 };
+                    Pixel { radiance: [value, value, value, distance], roughness, ..Pixel::WALL }
+                });
+                last_output(&case.run(executor))
+            };
+            let (coarse, fine) = (run(1), run(2));
+            let mut difference = 0.0;
+            for (index, texel) in coarse.iter().enumerate() {
+                let (x, y) = (2 * (index as u32 % size.x), 2 * (index as u32 / size.x));
+                let at = |dx: u32, dy: u32| fine[((y + dy) * 2 * size.x + x + dx) as usize][0];
+                let mean = (at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1)) / 4.0;
+                difference += (mean - texel[0]).abs() / coarse.len() as f32;
+            }
+            prop_assert!(difference <= 0.015, "{}", difference);
+            Ok(())
+        },
+    );
 }
 
 #[test]
 fn a_mirrored_scene_gives_a_mirrored_image() {
     let sizes = (1u32..5, 1u32..40).prop_map(|(tiles, height)| UVec2::new(8 * tiles, height));
-    for_all(16, (sizes, 0.1f32..1.0, 0u32..1000), |executor, (size, roughness, seed)| {
+    for_all(file!(), 16, (sizes, 0.1f32..1.0, 0u32..1000), |executor, (size, roughness, seed)| {
         let pixel = |frame: u32, p: UVec2| {
             let value = 1.0 + 0.2 * noise(seed + frame, p);
             let depth = if p.x < size.x / 3 { 3.0 } else { 4.0 };
@@ -193,7 +192,7 @@ fn a_mirrored_scene_gives_a_mirrored_image() {
 
 #[test]
 fn a_still_image_comes_to_rest() {
-    for_all(8, any_still(), |executor, (size, roughness, seed)| {
+    for_all(file!(), 8, any_still(), |executor, (size, roughness, seed)| {
         let case = Case::still(size, 60, |_, p| {
             let value = noise(seed, p);
             Pixel { radiance: [value, value * 0.5, 1.0, 3.0], roughness, ..Pixel::WALL }
@@ -218,7 +217,7 @@ const FOOTPRINT: i32 = 24;
 fn what_is_no_number_counts_as_black_and_is_soon_forgotten() {
     let poison = prop::sample::select(vec![f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0]);
     let place = (0.0f32..1.0, 0.0f32..1.0);
-    for_all(12, (any_still(), poison, place), |executor, ((size, roughness, seed), poison, place)| {
+    for_all(file!(), 12, (any_still(), poison, place), |executor, ((size, roughness, seed), poison, place)| {
         let at = (size.as_vec2() * glam::Vec2::from(place)).as_uvec2().min(size - 1);
         let run = |executor: &mut dyn Executor, value: Option<f32>| {
             let case = Case::still(size, 40, |frame, p| {
@@ -276,7 +275,7 @@ fn run_with_prev(case: &Case, executor: &mut dyn Executor, prev: impl Fn(usize) 
 fn what_is_supplied_of_last_frame_matters_only_where_there_is_history() {
     let anything = prop::sample::select(vec![0.0, 1.0, 4.0, -1.0, f32::NAN, f32::INFINITY, 3e38]);
     let any = (any_still(), any_pipeline(), anything, 1usize..4);
-    for_all(12, any, |executor, ((size, roughness, seed), pipeline, value, cut)| {
+    for_all(file!(), 12, any, |executor, ((size, roughness, seed), pipeline, value, cut)| {
         let mut case = Case::still(size, 5, |frame, p| Pixel {
             radiance: [0.5 + noise(seed + frame, p), 0.5, 1.0, 3.0],
             roughness,
@@ -306,7 +305,7 @@ fn what_is_no_surface_in_last_frames_gbuffer_costs_history_there_alone() {
     let poison = prop::sample::select(vec![f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0]);
     let place = (0.0f32..1.0, 0.0f32..1.0);
     let any = (any_still(), any_pipeline(), poison, 0usize..3, place);
-    for_all(12, any, |executor, ((size, roughness, seed), pipeline, poison, which, place)| {
+    for_all(file!(), 12, any, |executor, ((size, roughness, seed), pipeline, poison, which, place)| {
         let at = (size.as_vec2() * glam::Vec2::from(place)).as_uvec2().min(size - 1);
         let case = Case::still(size, 3, |frame, p| Pixel {
             radiance: [0.5 + noise(seed + frame, p), 0.5, 1.0, 3.0],
@@ -336,7 +335,7 @@ fn what_is_no_surface_in_last_frames_gbuffer_costs_history_there_alone() {
 
 #[test]
 fn the_sky_keeps_its_fallback() {
-    for_all(12, (any_still(), any::<bool>()), |executor, ((size, roughness, seed), is_black)| {
+    for_all(file!(), 12, (any_still(), any::<bool>()), |executor, ((size, roughness, seed), is_black)| {
         let is_sky = |p: UVec2| noise(seed ^ 77, p / 5) < 0.5;
         let mut case = Case::still(size, 3, |frame, p| {
             let depth = if is_sky(p) { 0.0 } else { 4.0 };
@@ -362,20 +361,25 @@ fn the_sky_keeps_its_fallback() {
 
 #[test]
 fn the_output_stays_between_the_darkest_and_the_brightest_input() {
-    for_all(16, (any_still(), 0.0f32..10.0, 0.01f32..1000.0), |executor, ((size, roughness, seed), low, range)| {
-        let mut case = Case::still(size, 6, |frame, p| {
-            let value = low + range * noise(seed + frame, p);
-            Pixel { radiance: [value, value, value, 3.0], roughness, ..Pixel::WALL }
-        });
-        case.settings = Preset::Reference.settings();
-        case.settings.conventions.depth = DepthEncoding::Linear;
-        case.settings.coverage.roughness_threshold = 1.0;
-        for texel in case.run(executor).iter().flat_map(Snapshot::output) {
-            let slack = 0.002 + 4.0 * HALF_STEP * texel[0];
-            prop_assert!(texel[0] >= low - slack && texel[0] <= low + range + slack, "{}", texel[0]);
-        }
-        Ok(())
-    });
+    for_all(
+        file!(),
+        16,
+        (any_still(), 0.0f32..10.0, 0.01f32..1000.0),
+        |executor, ((size, roughness, seed), low, range)| {
+            let mut case = Case::still(size, 6, |frame, p| {
+                let value = low + range * noise(seed + frame, p);
+                Pixel { radiance: [value, value, value, 3.0], roughness, ..Pixel::WALL }
+            });
+            case.settings = Preset::Reference.settings();
+            case.settings.conventions.depth = DepthEncoding::Linear;
+            case.settings.coverage.roughness_threshold = 1.0;
+            for texel in case.run(executor).iter().flat_map(Snapshot::output) {
+                let slack = 0.002 + 4.0 * HALF_STEP * texel[0];
+                prop_assert!(texel[0] >= low - slack && texel[0] <= low + range + slack, "{}", texel[0]);
+            }
+            Ok(())
+        },
+    );
 }
 
 /// As a packed guide a wall 2.5 units away that faces a camera which looks along -z, of roughness 0.25.

@@ -14,7 +14,10 @@ pub use case::{Case, Change, Image, Images, Pixel, Step, TexelFormat, half_bits}
 pub use executor::{Executor, executors, fastest};
 pub use snapshot::Snapshot;
 
-use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use std::cell::RefCell;
+
+use proptest::strategy::Strategy;
+use proptest::test_runner::{Config, RngAlgorithm, TestCaseError, TestRng, TestRunner};
 
 /// Says on standard error that a test does not run, past the test harness, which keeps to itself what a passing
 /// test prints. With `LIMPID_REQUIRE_DEVICE` set it fails instead.
@@ -40,4 +43,23 @@ pub fn runner(source_file: &'static str, cases: u32) -> (TestRunner, u32) {
         None => TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha)),
     };
     (runner, cases_to_run)
+}
+
+/// Runs a property of the output on many values with one executor, the fastest there is.
+///
+/// # Panics
+///
+/// With the smallest value found for which the property does not hold.
+pub fn for_all<S: Strategy>(
+    source_file: &'static str,
+    cases: u32,
+    strategy: S,
+    property: impl Fn(&mut dyn Executor, S::Value) -> Result<(), TestCaseError>,
+) {
+    let executor = RefCell::new(fastest());
+    let (mut runner, _) = runner(source_file, cases);
+    let result = runner.run(&strategy, |value| property(executor.borrow_mut().as_mut(), value));
+    if let Err(error) = result {
+        panic!("{error}");
+    }
 }
