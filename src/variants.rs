@@ -59,15 +59,28 @@ impl<T> Default for Made<T> {
 }
 
 impl<T> Made<T> {
-    /// What was made of a kernel.
-    pub fn get(&self, kernel: &Arc<Kernel>) -> Option<&T> {
-        self.0.iter().find(|(known, _)| Arc::ptr_eq(known, kernel)).map(|(_, made)| made)
-    }
-
-    /// Keeps what was made of a kernel, instead of what was kept before.
-    pub fn insert(&mut self, kernel: &Arc<Kernel>, made: T) {
+    /// What was made of a kernel, if it is still `usable`; else it is made now, and kept.
+    ///
+    /// # Errors
+    ///
+    /// Those of `make`; what was kept before stays.
+    pub fn get_or_make<E>(
+        &mut self,
+        kernel: &Arc<Kernel>,
+        usable: impl FnOnce(&T) -> bool,
+        make: impl FnOnce(&Kernel) -> Result<T, E>,
+    ) -> Result<T, E>
+    where
+        T: Clone,
+    {
+        let known = self.0.iter().find(|(known, _)| Arc::ptr_eq(known, kernel)).map(|(_, made)| made);
+        if let Some(made) = known.filter(|made| usable(made)) {
+            return Ok(made.clone());
+        }
+        let made = make(kernel)?;
         self.0.retain(|(known, _)| !Arc::ptr_eq(known, kernel));
-        self.0.push((Arc::clone(kernel), made));
+        self.0.push((Arc::clone(kernel), made.clone()));
+        Ok(made)
     }
 
     /// Drops what was made of kernels that are not among `kernels`.

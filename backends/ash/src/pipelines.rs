@@ -168,13 +168,9 @@ impl Pipelines {
         let mut passes = Vec::new();
         for (pass, kernel) in plan.passes.iter().zip(kernels) {
             let inputs = &inputs[stage_index(pass.stage)];
-            let known = made.get(kernel).filter(|pipeline| pipeline.inputs == inputs.bindings).cloned();
-            let pipeline = match known {
-                Some(pipeline) => pipeline,
-                None => Arc::new(Pipeline::new(gpu, kernel, inputs, options)?),
-            };
-            made.insert(kernel, Arc::clone(&pipeline));
-            passes.push(pipeline);
+            let fits = |pipeline: &Arc<Pipeline>| pipeline.inputs == inputs.bindings;
+            let make = |kernel: &Kernel| Pipeline::new(gpu, kernel, inputs, options).map(Arc::new);
+            passes.push(made.get_or_make(kernel, fits, make)?);
         }
         Ok(Self { passes, inputs })
     }

@@ -143,15 +143,7 @@ fn compile(kernel: &Kernel) -> Result<Executor, Error> {
 
 /// The compiled form of kernels: those of `made`, and new ones that are kept there.
 fn executors(kernels: &[Arc<Kernel>], made: &mut Made<Arc<Executor>>) -> Result<Vec<Arc<Executor>>, Error> {
-    let executor = |kernel| {
-        if let Some(executor) = made.get(kernel) {
-            return Ok(Arc::clone(executor));
-        }
-        let executor = Arc::new(compile(kernel)?);
-        made.insert(kernel, Arc::clone(&executor));
-        Ok(executor)
-    };
-    kernels.iter().map(executor).collect()
+    kernels.iter().map(|kernel| made.get_or_make(kernel, |_| true, |kernel| compile(kernel).map(Arc::new))).collect()
 }
 
 impl Denoiser {

@@ -1,6 +1,7 @@
 //! Pipelines and their layouts, from the core's reflection.
 
 use std::borrow::Cow;
+use std::convert::Infallible;
 use std::sync::Arc;
 
 use limpid::kernel::{Binding, BindingKind, Kernel};
@@ -63,12 +64,8 @@ fn group_layout(device: &wgpu::Device, label: &str, bindings: &[Binding], group:
 /// The pipelines of kernels: those of `made`, and new ones that are kept there.
 pub(crate) fn pipelines(device: &wgpu::Device, kernels: &[Arc<Kernel>], made: &mut Made<Pipeline>) -> Vec<Pipeline> {
     let pipeline = |kernel| {
-        if let Some(pipeline) = made.get(kernel) {
-            return pipeline.clone();
-        }
-        let pipeline = Pipeline::new(device, kernel);
-        made.insert(kernel, pipeline.clone());
-        pipeline
+        let made = made.get_or_make(kernel, |_| true, |kernel| Ok::<_, Infallible>(Pipeline::new(device, kernel)));
+        made.unwrap_or_else(|never| match never {})
     };
     kernels.iter().map(pipeline).collect()
 }
