@@ -8,7 +8,7 @@
 //! in   prev_guide    r32uint      full    last frame's, in fewer bits, or its normal, roughness, depth
 //! in   history       rgba16float  full    last frame's `history`
 //! in   blocks        rgba32uint   block   of the input: statistics, outliers' excess spread (block statistics)
-//! in   samples       rg32uint     block   largest luminances (outlier spread)
+//! in   samples       rg32uint     block   second and third largest luminance (outlier spread)
 //! in   light         r32uint      block   whether the light changed (light change)
 //! in   tiles, args   lists                tiles to denoise
 //! out  history       rgba16float  full    accumulated radiance, its length, noise and hit share
@@ -27,6 +27,7 @@ import package::shared::tiles;
 import package::shared::footprint;
 import package::shared::history;
 import package::shared::blocks;
+import package::shared::light;
 
 // Looks for history where the reflected point was, seen in the surface.
 override MIRROR_PARALLAX: bool = true;
@@ -70,6 +71,9 @@ const RARE: f32 = 2.0;
 const MIRROR_WEIGHT: f32 = 20.0;
 const MIRROR_UP_TO: f32 = 0.03;
 
+// Outliers of which there are two count up to so many times what bounds single ones, against the third sample of their
+// block and history. What is above is lost.
+const PAIR_FACTOR: f32 = 12.0;
 // Deviation that a sample counts as having of which no block says one.
 const ALONE_DEVIATION: f32 = 0.1;
 
@@ -107,12 +111,16 @@ fn surroundings_of(pixel: vec2<u32>, plane: Plane) -> Surroundings {
     return sum;
 }
 
+// The second and third largest luminance of a pixel's block.
+fn peaks_of(pixel: vec2<u32>) -> vec2<f32> {
+    return unpack2x16float(textureLoad(in_samples, pixel / BLOCK_SIZE, 0).x);
+}
+
 // The sample of this frame, exposed, without what makes it an outlier.
 fn sample_of(pixel: vec2<u32>, guide: Guide, around: Surroundings) -> vec3<f32> {
     let radiance = load_radiance(pixel);
     if OUTLIER_SPREAD {
-        let peaks = unpack2x16float(textureLoad(in_samples, pixel / BLOCK_SIZE, 0).x);
-        let kept = without_outlier(radiance, peaks, guide.roughness);
+        let kept = without_outlier(radiance, peaks_of(pixel).x, guide.roughness);
         // Very rare samples would come back as blotches.
         let returned = min(1.0, frame.excess_limit * luminance(around.mean) / luminance(around.excess));
         let excess = around.excess * (returned * around.fit);
@@ -347,16 +355,22 @@ fn chosen(candidates: Candidates, subject: Subject) -> Found {
 
 fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
     let subject = subject_of(pixel, guide);
-    let radiance = subject.radiance;
+    var radiance = subject.radiance;
     let share = subject.share;
     var found = chosen(candidates_of(pixel, subject), subject);
     if LIGHT_CHANGE {
-        let changed = unpack2x16float(textureLoad(in_light, pixel / BLOCK_SIZE, 0).x).y;
-        found.length *= 1.0 - changed * smoothstep(0.05, 0.2, guide.roughness);
+        let light = unpack_light(textureLoad(in_light, pixel / BLOCK_SIZE, 0).x);
+        found.length *= 1.0 - light.changed * smoothstep(0.05, 0.2, guide.roughness);
     }
     if HISTORY_CLIP {
         let bounded = clipped(found.radiance, radiance, pixel, guide.roughness);
         found.radiance = select(found.radiance, bounded, guide.roughness < frame.accumulate_clip_roughness);
+    }
+    if OUTLIER_SPREAD {
+        // Two outliers in a block hide each other.
+        let expected = max(peaks_of(pixel).y, luminance(found.radiance));
+        let limit = min(1.0, PAIR_FACTOR * frame.outlier_factor * expected / luminance(radiance));
+        radiance *= select(1.0, limit, found.length >= 1.0 && guide.roughness >= OUTLIER_ROUGHNESS);
     }
     let rate = 1.0 / (found.length + 1.0);
     let residual = brightness(radiance) - brightness(found.radiance);

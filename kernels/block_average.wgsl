@@ -5,7 +5,8 @@
 //! in   history    rgba16float   full    this frame's accumulated radiance (when ACCUMULATED)
 //! in   tiles, args   lists             tiles to denoise
 //! out  blocks     rgba32uint    block   surface, mean radiance, hit share; what was cut off from outliers
-//! out  samples    rg32uint      block   largest luminances, moments of brightness (not when ACCUMULATED)
+//! out  samples    rg32uint      block   second and third largest luminance, mean brightness, what one sample counts for (not
+//!                                       when ACCUMULATED)
 //!
 //! Grid: one invocation a block, workgroups of the blocks of 16 listed tiles (indirect).
 //! Each pixel is read twice.
@@ -39,8 +40,8 @@ override SAMPLES_ARE_USED: bool = false;
 struct Choice {
     guide: Guide,
     pixel: vec2<u32>,
-    // Largest luminance of its samples and the next.
-    peaks: vec2<f32>,
+    // The three largest luminances of its samples.
+    peaks: vec3<f32>,
 }
 
 // Pixels of a block on screen.
@@ -68,11 +69,13 @@ fn choose(corner: vec2<u32>) -> Choice {
         count += select(0u, 1u, guide.denoised);
         if !ACCUMULATED {
             let l = select(0.0, luminance(load_radiance(pixel)), guide.denoised);
-            choice.peaks = vec2<f32>(max(choice.peaks.x, l), max(choice.peaks.y, min(choice.peaks.x, l)));
+            let p = choice.peaks;
+            choice.peaks = vec3<f32>(max(p.x, l), max(p.y, min(p.x, l)), max(p.z, min(p.y, l)));
         }
     }
     // A sample on its own is above no other.
     choice.peaks.y = select(choice.peaks.y, choice.peaks.x, count < 2u);
+    choice.peaks.z = select(choice.peaks.z, choice.peaks.y, count < 3u);
     return choice;
 }
 
@@ -102,6 +105,7 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
     var share = vec2<f32>(0.0);
     var noise = vec2<f32>(0.0);
     var moments = vec2<f32>(0.0);
+    var squared_weight = 0.0;
     let size = pixel_count(corner);
     for (var i = 0u; i < size.x * size.y; i++) {
         let pixel = corner + vec2<u32>(i % size.x, i / size.x);
@@ -118,7 +122,7 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
             let distance = usable_hit_distance(textureLoad(in_radiance, pixel, 0).a);
             share += select(vec2<f32>(0.0), vec2<f32>(hit_share(distance, camera_distance), 1.0) * w, distance > 0.0);
             if OUTLIER_SPREAD {
-                let kept = without_outlier(c, choice.peaks, choice.guide.roughness);
+                let kept = without_outlier(c, choice.peaks.y, choice.guide.roughness);
                 excess += select(vec3<f32>(0.0), (c - kept) * w, guide.denoised);
                 c = kept;
             }
@@ -127,6 +131,7 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
         radiance += vec4<f32>(c, 1.0) * w;
         let b = brightness(c);
         moments += vec2<f32>(b, b * b) * w;
+        squared_weight += w * w;
     }
     let normalization = 1.0 / max(radiance.w, 1e-6);
     moments *= normalization;
@@ -136,14 +141,16 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
     block.excess = excess * normalization;
     // Weights next to nothing say nothing, and some devices round them to 0.
     block.share = select(0.5, share.x / max(share.y, 1e-6), share.y > 1e-6);
+    var variance = max(moments.y - moments.x * moments.x, 0.0);
     if ACCUMULATED {
         // Variance over time where most pixels know it, else variance over the block.
-        let spatial = max(moments.y - moments.x * moments.x, 0.0);
-        block.deviation = sqrt(mix(spatial, noise.x / max(noise.y, 1e-6), smoothstep(0.0, 0.5, noise.y * normalization)));
+        variance = mix(variance, noise.x / max(noise.y, 1e-6), smoothstep(0.0, 0.5, noise.y * normalization));
     }
+    block.deviation = sqrt(variance);
     if SAMPLES_ARE_USED {
-        let peaks = min(choice.peaks, vec2<f32>(HALF_MAX));
-        textureStore(out_samples, block_index, vec4<u32>(pack2x16float(peaks), pack2x16float(moments), 0u, 0u));
+        let peaks = min(choice.peaks.yz, vec2<f32>(HALF_MAX));
+        let brightness_and_weight = vec2<f32>(moments.x, squared_weight * normalization * normalization);
+        textureStore(out_samples, block_index, vec4<u32>(pack2x16float(peaks), pack2x16float(brightness_and_weight), 0u, 0u));
     }
     textureStore(out_blocks, block_index, pack_block(block));
 }

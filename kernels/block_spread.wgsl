@@ -5,7 +5,7 @@
 //! out  blocks   rgba32uint   block   with its excess, or its radiance, filtered
 //!
 //! Grid: one invocation a block, workgroups of the blocks of 16 listed tiles (indirect).
-//! 25 taps on a grid that stretches with the footprint.
+//! Up to 81 taps on a grid that stretches with the footprint; narrow footprints take fewer.
 
 import package::shared::frame;
 import package::shared::packing;
@@ -15,14 +15,13 @@ import package::shared::tiles;
 
 // Filters the radiance that was accumulated, not the excess of the input.
 override ACCUMULATED: bool = false;
+// Most taps on either side of the centre, along and across.
+override WIDE_TAPS: i32 = 4;
 
 @group(1) @binding(0) var in_blocks: texture_2d<u32>;
 @group(1) @binding(1) var out_blocks: texture_storage_2d<rgba32uint, write>;
 @group(1) @binding(2) var<storage, read> in_tiles: array<u32>;
 @group(1) @binding(3) var<storage, read> in_args: array<vec4<u32>, 4>;
-
-// Distance between taps, in half axes of the footprint.
-const SPACING: f32 = 0.5;
 
 @compute @workgroup_size(64)
 fn block_spread(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -51,22 +50,25 @@ fn block_spread(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     // In blocks.
     let radius = max(vec2<f32>(footprint.along, footprint.across) * (scale / f32(BLOCK_SIZE)), vec2<f32>(0.5));
     let side = side_of(footprint.axis);
-    let step = max(radius * SPACING, vec2<f32>(1.0));
+    // Every block within the half axes, or as many taps as there may be.
+    let reach = clamp(vec2<i32>(ceil(radius)), vec2<i32>(1), vec2<i32>(WIDE_TAPS));
+    let step = max(radius / f32(WIDE_TAPS), vec2<f32>(1.0));
+    let row = 2 * reach.x + 1;
     // rgb: radiance or excess; a: weight.
     var sum = vec4<f32>(0.0);
-    for (var i = 0; i < 25; i++) {
-        let grid = vec2<f32>(vec2<i32>(i % 5, i / 5) - 2);
+    for (var i = 0; i < row * (2 * reach.y + 1); i++) {
+        let grid = vec2<f32>(vec2<i32>(i % row, i / row) - reach);
         let offset = round(footprint.axis * (grid.x * step.x) + side * (grid.y * step.y));
         let at = clamp(center + vec2<i32>(offset), vec2<i32>(0), last);
         let tap = unpack_block(textureLoad(in_blocks, at, 0));
         let rho = vec2<f32>(dot(offset, footprint.axis), dot(offset, side)) / radius;
-        let penalty = plane_penalty(plane, tap.guide, block_place(at));
+        let penalty = plane_penalty(plane, tap.guide, block_place(at)) + 1.2 * dot(rho, rho);
         let fits = tap.guide.denoised && all(at == center + vec2<i32>(offset));
         if ACCUMULATED {
             let apart = (tap.share - block.share) * (1.0 / SHARE_TOLERANCE);
-            sum += vec4<f32>(tap.radiance, 1.0) * select(0.0, exp(-penalty - apart * apart - 1.2 * dot(rho, rho)), fits);
+            sum += vec4<f32>(tap.radiance, 1.0) * select(0.0, exp(-penalty - apart * apart), fits);
         } else {
-            sum += vec4<f32>(tap.excess, 1.0) * select(0.0, exp(-penalty - 0.6 * dot(rho, rho)), fits);
+            sum += vec4<f32>(tap.excess, 1.0) * select(0.0, exp(-penalty), fits);
         }
     }
     let mean = sum.rgb / max(sum.w, 1e-6);

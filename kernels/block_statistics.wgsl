@@ -1,12 +1,12 @@
 //! Block statistics: smooths blocks over their neighbours, and notices where the light changed.
 //!
 //! in   blocks       rgba32uint    block   of the input
-//! in   samples      rg32uint      block   moments of brightness
+//! in   samples      rg32uint      block   mean brightness, what one sample counts for
 //! in   motion       any float     full    uv motion of the surface (light change, surface motion)
 //! in   prev_light   r32uint       block   last frame's `light`
 //! in   tiles, args   lists                tiles to denoise
 //! out  blocks       rgba32uint    block   mean over 3x3 blocks, deviation between them
-//! out  light        r32uint       block   typical brightness of a sample over time, and whether it changed
+//! out  light        r32uint       block   brightness of a sample over time, its deviation, and whether it changed
 //!
 //! Grid: one invocation a block, workgroups of the blocks of 16 listed tiles (indirect).
 //! 9 taps.
@@ -18,6 +18,7 @@ import package::shared::packing;
 import package::shared::footprint;
 import package::shared::history;
 import package::shared::blocks;
+import package::shared::light;
 import package::shared::tiles;
 
 // Notices where the light changed.
@@ -37,9 +38,11 @@ override SURFACE_MOTION: bool = true;
 
 // A change counts beyond this, standard errors and a share of the brightness.
 const LIGHT_FLOOR: f32 = 0.01;
+// What is known of the light errs too: the variance of both together, over that of a frame alone.
+const KNOWN_VARIANCE: f32 = 1.33;
 
-// Brightness that last frames had typically, where the surface was; 0 where it is not known.
-fn known_brightness(block: vec2<i32>, position: vec3<f32>) -> f32 {
+// What last frames had, where the surface was; brightness is 0 where it is not known.
+fn known_light(block: vec2<i32>, position: vec3<f32>) -> Light {
     var prev_uv = vec2<f32>(0.0);
     if SURFACE_MOTION {
         let pixel = vec2<u32>(block_place(block));
@@ -52,14 +55,9 @@ fn known_brightness(block: vec2<i32>, position: vec3<f32>) -> f32 {
     // Not a number fails the comparison.
     let on_screen = all(place >= vec2<f32>(0.0)) && all(place < vec2<f32>(frame.prev_size));
     let prev_block = vec2<i32>(select(vec2<f32>(0.0), place, on_screen)) / i32(BLOCK_SIZE);
-    let kept = unpack2x16float(textureLoad(in_prev_light, prev_block, 0).x).x;
-    let l = min(kept * frame.exposure, HALF_MAX);
-    return select(0.0, l / (1.0 + l), on_screen);
-}
-
-// Brightness as it is kept: as luminance that is not exposed, since exposure may change.
-fn luminance_to_keep(brightness: f32) -> f32 {
-    return min(brightness / max(1.0 - brightness, 1e-5) * frame.inverse_exposure, HALF_MAX);
+    var light = unpack_light(textureLoad(in_prev_light, prev_block, 0).x);
+    light.brightness = select(0.0, light.brightness, on_screen);
+    return light;
 }
 
 @compute @workgroup_size(64)
@@ -103,10 +101,11 @@ fn block_statistics(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invo
         let b = brightness(tap.radiance);
         moments += vec2<f32>(b, b * b) * w;
         if LIGHT_CHANGE {
-            // Blocks that show no reflection have none.
+            // x: mean brightness, y: sum of squared weights. Blocks that show no reflection have none.
             let samples = unpack2x16float(textureLoad(in_samples, at, 0).y);
-            sample_moments += select(vec2<f32>(0.0), samples * w, tap.guide.denoised);
-            squared_weight += w * w;
+            let second_moment = tap.deviation * tap.deviation + samples.x * samples.x;
+            sample_moments += select(vec2<f32>(0.0), vec2<f32>(samples.x, second_moment) * w, tap.guide.denoised);
+            squared_weight += select(0.0, w * w * samples.y, tap.guide.denoised);
         }
     }
     let normalization = 1.0 / max(radiance.w, 1e-6);
@@ -119,14 +118,19 @@ fn block_statistics(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invo
 
     if LIGHT_CHANGE {
         sample_moments *= normalization;
-        // Of a weighted mean of blocks of 16 samples.
-        let variance = max(sample_moments.y - sample_moments.x * sample_moments.x, 0.0)
-            * (squared_weight * normalization * normalization / 16.0);
-        let typical = sample_moments.x;
-        let known = known_brightness(center, position);
-        let tolerance = frame.light_change_sigma * sqrt(variance) + frame.light_change_share * known + LIGHT_FLOOR;
-        let changed = select(0.0, smoothstep(1.0, 2.0, abs(typical - known) / tolerance), known > 0.0);
-        let kept = select(typical, mix(known, typical, max(frame.light_change_rate, changed)), known > 0.0);
-        textureStore(out_light, center, vec4<u32>(pack2x16float(vec2<f32>(luminance_to_keep(kept), changed)), 0u, 0u, 0u));
+        let known = known_light(center, position);
+        let variance = max(sample_moments.y - sample_moments.x * sample_moments.x, 0.0);
+        // Of the calmer frames: those without the lamp, before it is switched on and after it is switched off.
+        let calmer = min(variance, known.deviation * known.deviation);
+        let error = sqrt(calmer * squared_weight * KNOWN_VARIANCE) * normalization;
+        let tolerance = frame.light_change_sigma * error + frame.light_change_share * known.brightness + LIGHT_FLOOR;
+        let excess = abs(sample_moments.x - known.brightness) / tolerance;
+        let is_known = known.brightness > 0.0;
+        var light: Light;
+        light.changed = select(0.0, smoothstep(1.0, 2.0, excess), is_known);
+        let rate = select(1.0, max(frame.light_change_rate, light.changed), is_known);
+        light.brightness = mix(known.brightness, sample_moments.x, rate);
+        light.deviation = sqrt(mix(known.deviation * known.deviation, variance, rate));
+        textureStore(out_light, center, vec4<u32>(pack_light(light), 0u, 0u, 0u));
     }
 }

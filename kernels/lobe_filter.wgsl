@@ -37,11 +37,11 @@ override WIDE_FILTER: bool = true;
 @group(1) @binding(7) var out_prev_guide: texture_storage_2d<r32uint, write>;
 
 // Near taps reach from so many pixels, for mirrors, to so many.
-const NEAR_LEAST: f32 = 1.5;
+const NEAR_LEAST: f32 = 1.7;
 const NEAR_MOST: f32 = 3.0;
 // Half axis of the filter, in pixels, from and to which blocks take over.
-const WIDE_FROM: f32 = 1.0;
-const WIDE_TO: f32 = 3.0;
+const WIDE_FROM: f32 = 0.7;
+const WIDE_TO: f32 = 2.5;
 // Blocks whose hit share differs by this show other things: contact shadows of a light that is far away end sharply.
 const WIDE_SHARE: f32 = 0.15;
 // Half axis below which, and from which no longer, taps may differ by noise alone.
@@ -114,7 +114,9 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let taps = select(NEAR_TAPS, 0u, by_blocks >= 1.0);
     // a: weight.
     var sum = vec4<f32>(0.0);
+    // The largest luminance of taps, and the next.
     var brightest = 0.0;
+    var next = 0.0;
     for (var i = 0u; i < taps; i++) {
         let point = direction * (reach * sqrt(f32(i) + 0.5));
         direction = turned(direction);
@@ -129,16 +131,19 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
         let rho = vec2<f32>(dot(offset, footprint.axis), dot(offset, side)) * falloff;
         let apart = (history.share - own.share) * (1.0 / SHARE_TOLERANCE);
         let brighter = brightness(radiance) - own_brightness;
-        let penalty = plane_penalty(plane, tap, vec2<f32>(texel) + 0.5) + 1.2 * dot(rho, rho) + apart * apart
+        let penalty = plane_penalty(plane, tap, vec2<f32>(texel) + 0.5) + dot(rho, rho) + apart * apart
             + noise_falloff * brighter * brighter;
         let counts = tap.denoised && all(at == texel) && any(at != vec2<i32>(pixel));
         let w = select(0.0, trust(history.length) * exp(-penalty), counts);
         sum += vec4<f32>(select(vec3<f32>(0.0), kept, counts), 1.0) * w;
-        brightest = max(brightest, select(0.0, l, counts));
+        let counted = select(0.0, l, counts);
+        next = max(next, min(brightest, counted));
+        brightest = max(brightest, counted);
     }
-    // What stands out alone has to last: above the brightest tap it counts as so many times as bright as frames saw it.
-    let limit = min(1.0, own.length * brightest / luminance(own_radiance));
-    let alone = select(1.0, limit, brightest > 0.0 && guide.roughness >= OUTLIER_ROUGHNESS);
+    // What stands out alone, or in a pair, has to last: above the other taps it counts as so many times as bright as
+    // frames saw it.
+    let limit = min(1.0, own.length * next / luminance(own_radiance));
+    let alone = select(1.0, limit, next > 0.0 && guide.roughness >= OUTLIER_ROUGHNESS);
     sum += vec4<f32>(own_radiance * alone, 1.0) * trust(own.length);
     let near = sum.rgb / sum.a;
     return vec4<f32>(blend(near, wide.radiance, by_blocks), wide.variance);

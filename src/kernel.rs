@@ -42,6 +42,7 @@ const SOURCES: &[(&str, &str)] = sources![
     "shared/frame",
     "shared/gbuffer",
     "shared/history",
+    "shared/light",
     "shared/neighborhood",
     "shared/outliers",
     "shared/packing",

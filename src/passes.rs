@@ -255,7 +255,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         is_needed: |settings| settings.features.outlier_spread,
         stage: Stage::Denoise,
         grid: GridTemplate::List(3),
-        overrides: &[],
+        overrides: &["WIDE_TAPS"],
         bindings: &[
             ("in_blocks", BLOCKS, Current),
             ("in_tiles", "tiles", Current),
@@ -333,7 +333,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         is_needed: has_wide_filter,
         stage: Stage::Denoise,
         grid: GridTemplate::List(3),
-        overrides: &["ACCUMULATED"],
+        overrides: &["ACCUMULATED", "WIDE_TAPS"],
         bindings: &[
             ("in_blocks", BLOCKS, Current),
             ("in_tiles", "tiles", Current),
@@ -482,6 +482,7 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         "BLOCK_STATISTICS" => f64::from(features.compares_with_blocks()),
         "SAMPLES_ARE_USED" => f64::from(features.light_change || features.outlier_spread),
         "NEAR_TAPS" => f64::from(if features.spatial_filter { features.near_taps } else { 0 }),
+        "WIDE_TAPS" => f64::from(features.wide_taps),
         "WIDE_FILTER" => f64::from(has_wide_filter(settings)),
         "AVERAGE_IS_READ" => f64::from(features.history_clip || features.average_mixing),
         "MIRROR_PARALLAX" => f64::from(features.mirror_parallax),

@@ -30,6 +30,7 @@ impl Preset {
             Preset::Fast => {
                 let mut settings = Settings::default();
                 settings.features.near_taps = 4;
+                settings.features.wide_taps = 2;
                 settings
             }
             Preset::Reference => {
@@ -287,6 +288,9 @@ pub struct Features {
     pub wide_filter: bool,
     /// Footprint pipeline: pixels that each is filtered with besides, 0 to 64.
     pub near_taps: u32,
+    /// Footprint pipeline: most blocks on either side of a block, along and across the footprint, that filters over
+    /// blocks read, 1 to 16. What lies between is passed over where footprints are wider.
+    pub wide_taps: u32,
     /// Perceptual roughness, 0 to 1, where it is the same everywhere: then there is no `roughness` input.
     pub constant_roughness: Option<f32>,
     /// Keeps what the next frame needs of the G-buffer. Without it the renderer, which double-buffers its own,
@@ -316,6 +320,7 @@ impl Default for Features {
             block_statistics: true,
             wide_filter: true,
             near_taps: 12,
+            wide_taps: 4,
             constant_roughness: None,
             gbuffer_copy: true,
             packed_guide: true,
@@ -355,6 +360,7 @@ impl Features {
             return refuse("the debug view average needs an average: block_statistics or outlier_spread has to be on");
         }
         check_range("features.near_taps", self.near_taps as f32, 0.0, 64.0, "0 to 64")?;
+        check_range("features.wide_taps", self.wide_taps as f32, 1.0, 16.0, "1 to 16")?;
         if let Some(roughness) = self.constant_roughness {
             check_range("features.constant_roughness", roughness, 0.0, 1.0, "0 to 1")?;
         }
@@ -510,7 +516,7 @@ numeric_settings! {
     /// as the camera sees it.
     Footprint in "footprint" {
         /// Half axis of the filter of what was accumulated.
-        filter_scale = 0.6, 0.0 to 10.0;
+        filter_scale = 0.65, 0.0 to 10.0;
         /// Half axis over which the excess of outliers is spread.
         excess_scale = 1.0, 0.0 to 10.0;
         /// Least width at grazing angles, as a share of the length. 1 is round, less follows the lobe.

@@ -35,12 +35,13 @@ fn off(pipeline: Pipeline) -> Vec<(&'static str, Change)> {
         ("edge_repair", |features| features.edge_repair = false),
         ("average_mixing", |features| features.average_mixing = false),
     ];
-    let footprint: [(&str, Change); 6] = [
+    let footprint: [(&str, Change); 7] = [
         ("hit_motion", |features| features.hit_motion = false),
         ("light_change", |features| features.light_change = false),
         ("outlier_spread", |features| features.outlier_spread = false),
         ("wide_filter", |features| features.wide_filter = false),
         ("near_taps", |features| features.near_taps = 0),
+        ("wide_taps", |features| features.wide_taps = 1),
         ("block_statistics", |features| features.block_statistics = false),
     ];
     let own: &[_] = if pipeline == Pipeline::Published { &published } else { &footprint };
@@ -102,8 +103,8 @@ fn what_is_off_costs_nothing() {
             let without = Cost::of(&with(pipeline, &[change]));
             println!("{name}: {} of {} words, {} bytes", without.words(), everything.words(), without.bytes);
             assert!(without.is_within(&everything), "{name}: {without:?} and {everything:?}");
-            // The number of taps is a number; blocks are there for outliers too.
-            let is_same = ["near_taps", "block_statistics"].contains(&name);
+            // Numbers of taps are numbers; blocks are there for outliers too.
+            let is_same = ["near_taps", "wide_taps", "block_statistics"].contains(&name);
             assert!(without.words() < everything.words() || is_same, "{name}");
             // On top of each other too.
             for (other_name, other) in off(pipeline) {

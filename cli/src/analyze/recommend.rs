@@ -257,10 +257,18 @@ pub fn untried(settings: &Settings, recommended: &[Change]) -> Vec<Change> {
         "surface_motion",
     ];
     const NEAR_TAPS: [u32; 5] = [0, 2, 4, 6, 8];
+    const WIDE_TAPS: [u32; 2] = [1, 2];
     let (because, holds_while) = ("its loss stays within the bound", "scenes are like these frames");
     let off = FEATURES.iter().map(|feature| Change::off(feature, because, holds_while));
-    let taps = NEAR_TAPS.into_iter().filter(|taps| *taps < settings.features.near_taps);
-    let taps = taps.map(|taps| Change::new("features.near_taps", json!(taps), because, holds_while));
+    let fewer = |path, choices: &[u32], now| {
+        let fewer = choices.iter().filter(move |taps| **taps < now).map(|taps| json!(taps)).collect::<Vec<_>>();
+        fewer.into_iter().map(move |taps| Change::new(path, taps, because, holds_while))
+    };
+    let taps = fewer("features.near_taps", &NEAR_TAPS, settings.features.near_taps).chain(fewer(
+        "features.wide_taps",
+        &WIDE_TAPS,
+        settings.features.wide_taps,
+    ));
     let cost = |settings: &Settings| Plan::new(settings, UVec2::splat(8)).ok().map(|(plan, _)| plan);
     let (base, given) = (apply(settings, recommended).ok(), cost(settings));
     let changes_plan = |change: &Change| {
