@@ -1,7 +1,7 @@
 //! Debug view: shows in colours what the footprint pipeline finds out about each pixel.
 //!
 //! in   guide          rg32uint      full    packed G-buffer, or normal, roughness, depth
-//! in   tile_flags     r32uint       tile    whether a pixel of the tile is denoised: elsewhere the guide says nothing
+//! in   idle_frames    u32           tile    0 if a pixel of the tile is denoised: elsewhere the guide says nothing
 //! in   accumulated    rgba16float   full    this frame's `history` (history length, variance)
 //! in   radiance       any float     full    hit distance; all that `accumulate` reads (disocclusion, candidate)
 //! in   blocks         rgba32uint    block   as `accumulate` reads them (average)
@@ -15,7 +15,7 @@ import package::accumulate;
 import package::shared::debug_view;
 
 @group(1) @binding(9) var in_accumulated: texture_2d<f32>;
-@group(1) @binding(10) var in_tile_flags: texture_2d<u32>;
+@group(1) @binding(10) var<storage, read> in_idle_frames: array<u32>;
 
 fn is_on_prev_screen(prev_uv: vec2<f32>) -> bool {
     let place = prev_uv * vec2<f32>(frame.prev_size);
@@ -72,7 +72,7 @@ fn debug_view(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation
     let pixel = group.xy * TILE_SIZE + lane_position(lane);
     let on_screen = all(pixel < frame.size);
     var guide: Guide;
-    if on_screen && textureLoad(in_tile_flags, min(group.xy, tile_counts() - 1u), 0).x != 0u {
+    if on_screen && in_idle_frames[tile_index(group.xy)] == 0u {
         guide = load_guide(pixel);
     }
     if VIEW == TILE_CLASSES {

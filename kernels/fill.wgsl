@@ -1,4 +1,5 @@
-//! Fill: gives the tiles that are left out altogether their fallback value.
+//! Fill: gives the tiles that are left out altogether their fallback value. Black ones keep it: of those only tiles that
+//! were denoised one or two frames ago are filled.
 //!
 //! in   guide      rg32uint      full   packed G-buffer, or normal, roughness, depth (environment fallback)
 //! in   radiance   any float     full   input fallback only
@@ -6,7 +7,8 @@
 //! out  prev_guide r32uint       full   0 (footprint pipeline, G-buffer copy)
 //! out  guide      rg32uint      full   0 beside tiles that are denoised, unless it is complete
 //!
-//! Grid: one 8x8 workgroup per 16 left-out tiles (indirect), an invocation handles a pixel of each. Touches that only.
+//! Grid: one 8x8 workgroup per 16 left-out tiles with something to write (indirect), an invocation handles a pixel of each.
+//! Touches that only.
 
 import package::shared::frame;
 import package::shared::packing;
@@ -17,8 +19,8 @@ import package::shared::fallback;
 
 // Its copy for the next frame is the footprint pipeline's.
 override PREV_GUIDE_IS_KEPT: bool = false;
-// `classify` wrote the guide in tiles that are left out.
-override GUIDE_IS_COMPLETE: bool = true;
+// Filters look beside tiles that are denoised, where `classify` wrote no guide.
+override FRINGE_IS_CLEARED: bool = false;
 
 @group(1) @binding(1) var<storage, read> in_tiles: array<u32>;
 @group(1) @binding(2) var<storage, read> in_args: array<vec4<u32>, 4>;
@@ -44,33 +46,35 @@ fn entry_at(index: u32) -> u32 {
     return in_tiles[counts.x * counts.y - 1u - index];
 }
 
-// Writes guides of pixels that are left out into the tiles of a workgroup that `fringe` has bits of.
-fn clear_guides(first: u32, fringe: u32, lane: u32) {
-    for (var left = fringe; left != 0u; left &= left - 1u) {
-        let pixel = unpack_tile(entry_at(first + lowest_bit(left))) * TILE_SIZE + lane_position(lane);
-        if all(pixel < frame.size) {
-            textureStore(out_guide, pixel, vec4<u32>(0u));
-        }
-    }
+// The pixel that a lane handles in a tile of the list.
+fn pixel_of(index: u32, lane: u32) -> vec2<u32> {
+    return unpack_tile(entry_at(index)) * TILE_SIZE + lane_position(lane);
 }
 
 @compute @workgroup_size(8, 8)
 fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let first = list_index(group) * TILES_PER_GROUP;
     let count = min(TILES_PER_GROUP, in_args[1].w - min(first, in_args[1].w));
-    // A bit for each tile beside one that is denoised, whose filters tap it.
+    // A bit for each tile.
+    var unfilled = 0u;
     var fringe = 0u;
     for (var i = 0u; i < count; i++) {
         let entry = entry_at(first + i);
+        unfilled |= select(0u, 1u << i, (entry & TILE_IS_UNFILLED) != 0u);
         fringe |= select(0u, 1u << i, (entry & TILE_IS_FRINGE) != 0u);
-        let pixel = unpack_tile(entry) * TILE_SIZE + lane_position(lane);
+    }
+    for (var left = unfilled; left != 0u; left &= left - 1u) {
+        let pixel = pixel_of(first + lowest_bit(left), lane);
         if all(pixel < frame.size) {
             fill_pixel(pixel);
         }
     }
-    if !GUIDE_IS_COMPLETE {
-        if GUIDE_IS_PACKED {
-            clear_guides(first, fringe, lane);
+    if FRINGE_IS_CLEARED {
+        for (var left = fringe; left != 0u; left &= left - 1u) {
+            let pixel = pixel_of(first + lowest_bit(left), lane);
+            if all(pixel < frame.size) {
+                textureStore(out_guide, pixel, vec4<u32>(0u));
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Indirect arguments: turns the counters of classify into the grids of the passes that follow, and resets
 //! them for the next frame.
 //!
-//! in/out  counters   4 x u32    listed tiles, left-out tiles, rays
+//! in/out  counters   4 x u32    listed tiles, left-out tiles that `fill` writes, rays
 //! out     args       16 x u32   per list: workgroups in x, y, z, and the length of the list
 //!
 //! Grid: one invocation. After: the same pass of the AMD FidelityFX denoiser 1.2 (2021). Differs: grids have

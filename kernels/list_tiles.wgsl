@@ -1,10 +1,10 @@
 //! List tiles: makes the lists of 8x8 tiles that are denoised and that are left out, and clears what later passes
 //! read in those.
 //!
-//! in      tile_flags             r32uint       tile    whether a pixel of the tile is denoised
-//! in/out  counters               4 x u32       listed tiles, left-out tiles
-//! out     tiles                  u32 list      listed tiles from the front; from the back left-out tiles, with a mark where
-//!                                              a neighbour is listed
+//! in      idle_frames            u32           tile    frames in a row in which nothing was denoised, 0 for listed tiles
+//! in/out  counters               4 x u32       listed tiles, left-out tiles that `fill` writes
+//! out     tiles                  u32 list      listed tiles from the front; those left-out tiles from the back, with marks
+//!                                              where the output has to be filled and where a neighbour is listed
 //! out     average                rgba16float   tile    0 in tiles that are left out (published pipeline)
 //! out     blocks, other_blocks   rgba32uint    block   the same (footprint pipeline)
 //! out     light                  r32uint       block   the same (light change)
@@ -23,8 +23,10 @@ override AVERAGE_IS_USED: bool = true;
 override BLOCKS_ARE_USED: bool = false;
 // Later passes notice where the light changed.
 override LIGHT_CHANGE: bool = false;
+// The guide has to be cleared beside listed tiles.
+override FRINGE_IS_CLEARED: bool = false;
 
-@group(1) @binding(0) var in_tile_flags: texture_2d<u32>;
+@group(1) @binding(0) var<storage, read> in_idle_frames: array<u32>;
 @group(1) @binding(1) var<storage, read_write> out_tiles: array<u32>;
 @group(1) @binding(2) var<storage, read_write> inout_counters: array<atomic<u32>, 4>;
 @group(1) @binding(3) var out_average: texture_storage_2d<rgba16float, write>;
@@ -57,12 +59,21 @@ fn clear_tile(tile: vec2<u32>) {
 // Whether one of the tiles around is listed.
 fn is_fringe(tile: vec2<u32>) -> bool {
     let last = vec2<i32>(tile_counts()) - 1;
-    var found = 0u;
+    var found = false;
     for (var i = 0; i < 9; i++) {
         let at = clamp(vec2<i32>(tile) + vec2<i32>(i % 3, i / 3) - 1, vec2<i32>(0), last);
-        found |= textureLoad(in_tile_flags, at, 0).x;
+        found = found || in_idle_frames[tile_index(vec2<u32>(at))] == 0u;
     }
-    return found != 0u;
+    return found;
+}
+
+// What `fill` has to do in a tile that is left out.
+fn marks_of(tile: vec2<u32>, idle_frames: u32) -> u32 {
+    var marks = select(0u, TILE_IS_UNFILLED, idle_frames <= FRAMES_TO_FILL);
+    if FRINGE_IS_CLEARED {
+        marks |= select(0u, TILE_IS_FRINGE, is_fringe(tile));
+    }
+    return marks;
 }
 
 @compute @workgroup_size(8, 8)
@@ -74,24 +85,26 @@ fn list_tiles(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invoc
         atomicStore(&group_counts[lane], 0u);
     }
     workgroupBarrier();
-    let is_listed = textureLoad(in_tile_flags, min(tile, counts - 1u), 0).x != 0u;
+    let idle_frames = in_idle_frames[tile_index(min(tile, counts - 1u))];
+    let is_listed = idle_frames == 0u;
     let list = select(1u, 0u, is_listed);
+    var marks = 0u;
+    if on_screen && !is_listed {
+        clear_tile(tile);
+        marks = marks_of(tile, idle_frames);
+    }
+    let is_noted = on_screen && (is_listed || marks != 0u);
     var index = 0u;
-    var packed = pack_tile(tile);
-    if on_screen {
+    if is_noted {
         index = atomicAdd(&group_counts[list], 1u);
-        if !is_listed {
-            clear_tile(tile);
-            packed |= select(0u, TILE_IS_FRINGE, is_fringe(tile));
-        }
     }
     workgroupBarrier();
     if lane < 2u {
         group_first[lane] = atomicAdd(&inout_counters[lane], atomicLoad(&group_counts[lane]));
     }
     workgroupBarrier();
-    if on_screen {
+    if is_noted {
         index += group_first[list];
-        out_tiles[select(counts.x * counts.y - 1u - index, index, is_listed)] = packed;
+        out_tiles[select(counts.x * counts.y - 1u - index, index, is_listed)] = pack_tile(tile) | marks;
     }
 }

@@ -82,7 +82,7 @@ const FILL: PassTemplate = PassTemplate {
     is_needed: always,
     stage: Stage::Denoise,
     grid: GridTemplate::List(1),
-    overrides: &["FALLBACK", "PREV_GUIDE_IS_KEPT", "GUIDE_IS_COMPLETE"],
+    overrides: &["FALLBACK", "PREV_GUIDE_IS_KEPT", "FRINGE_IS_CLEARED"],
     bindings: &[
         ("in_radiance", "radiance", Current),
         ("in_environment", "environment", Current),
@@ -104,11 +104,11 @@ const PASSES: &[PassTemplate] = &[
         is_needed: always,
         stage: Stage::Classify,
         grid: GridTemplate::Tiles(4),
-        overrides: &["RAYS_PER_QUAD", "RAYS_FOLLOW_VARIANCE", "GUIDE_IS_COMPLETE"],
+        overrides: &["RAYS_PER_QUAD", "RAYS_FOLLOW_VARIANCE", "GUIDE_IS_COMPLETE", "FALLBACK_IS_BLACK"],
         bindings: &[
             ("in_history", LAST_OUTPUT, Current),
             ("out_guide", "guide", Current),
-            ("out_tile_flags", "tile_flags", Current),
+            ("inout_idle_frames", "idle_frames", Current),
             ("out_rays", "rays", Current),
             ("out_counters", "counters", Current),
         ],
@@ -119,9 +119,9 @@ const PASSES: &[PassTemplate] = &[
         is_needed: always,
         stage: Stage::Classify,
         grid: GridTemplate::Tiles(8),
-        overrides: &["AVERAGE_IS_USED", "BLOCKS_ARE_USED", "LIGHT_CHANGE"],
+        overrides: &["AVERAGE_IS_USED", "BLOCKS_ARE_USED", "LIGHT_CHANGE", "FRINGE_IS_CLEARED"],
         bindings: &[
-            ("in_tile_flags", "tile_flags", Current),
+            ("in_idle_frames", "idle_frames", Current),
             ("out_tiles", "tiles", Current),
             ("inout_counters", "counters", Current),
             ("out_average", "average", Current),
@@ -309,7 +309,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             ("in_blocks", BLOCKS, Current),
             ("in_samples", "samples", Current),
             ("in_accumulated", "history", Current),
-            ("in_tile_flags", "tile_flags", Current),
+            ("in_idle_frames", "idle_frames", Current),
             ("out_debug_view", DEBUG_VIEW, Current),
         ],
     },
@@ -387,6 +387,17 @@ fn has_debug_view(settings: &Settings) -> bool {
     settings.features.debug_view.is_some()
 }
 
+/// The published pipeline's copy of the G-buffer is the packed guide.
+fn is_guide_packed(settings: &Settings) -> bool {
+    let features = &settings.features;
+    features.packed_guide || settings.pipeline == Pipeline::Published && features.gbuffer_copy
+}
+
+/// The published pipeline looks at last frame's surfaces, denoised or not.
+fn is_guide_complete(settings: &Settings) -> bool {
+    settings.pipeline == Pipeline::Published || settings.coverage.fallback == Fallback::Environment
+}
+
 /// All resources that passes can name.
 pub(crate) fn all_resources() -> Vec<Resource> {
     let resource = |name: &str, kind, lifetime, ping_pong| Resource {
@@ -422,7 +433,7 @@ pub(crate) fn all_resources() -> Vec<Resource> {
         resource(OTHER_BLOCKS, texture(Format::Rgba32Uint, Extent::Block), Lifetime::Transient, false),
         resource("samples", texture(Format::Rg32Uint, Extent::Block), Lifetime::Transient, false),
         resource("light", texture(Format::R32Uint, Extent::Block), Lifetime::Persistent, true),
-        resource("tile_flags", texture(Format::R32Uint, Extent::Tile), Lifetime::Transient, false),
+        resource("idle_frames", buffer(4, Count::Per(Extent::Tile), false), Lifetime::Persistent, false),
         resource("tiles", buffer(4, Count::Per(Extent::Tile), false), Lifetime::Transient, false),
         resource("rays", buffer(4, Count::Per(Extent::Full), false), Lifetime::Transient, false),
         resource("counters", buffer(4, Count::Fixed(4), false), Lifetime::Persistent, false),
@@ -459,11 +470,7 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         },
         "RAYS_FOLLOW_VARIANCE" => f64::from(ray_list.is_some_and(|list| list.variance_threshold.is_some())),
         "ROUGHNESS_IS_CONSTANT" => f64::from(features.constant_roughness.is_some()),
-        // The published pipeline's copy of the G-buffer is the packed guide.
-        "GUIDE_IS_PACKED" => {
-            let is_copy = settings.pipeline == Pipeline::Published && features.gbuffer_copy;
-            f64::from(features.packed_guide || is_copy)
-        }
+        "GUIDE_IS_PACKED" => f64::from(is_guide_packed(settings)),
         "GBUFFER_IS_COPIED" => f64::from(features.gbuffer_copy),
         "AVERAGE_IS_USED" => f64::from(settings.pipeline == Pipeline::Published && features.uses_average()),
         "PREV_GUIDE_IS_KEPT" => f64::from(settings.pipeline == Pipeline::Footprint && features.gbuffer_copy),
@@ -471,10 +478,9 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
             let has_blocks = has_input_blocks(settings) || has_wide_filter(settings);
             f64::from(settings.pipeline == Pipeline::Footprint && has_blocks)
         }
-        // The published pipeline looks at last frame's surfaces, denoised or not.
-        "GUIDE_IS_COMPLETE" => {
-            f64::from(settings.pipeline == Pipeline::Published || settings.coverage.fallback == Fallback::Environment)
-        }
+        "GUIDE_IS_COMPLETE" => f64::from(is_guide_complete(settings)),
+        "FRINGE_IS_CLEARED" => f64::from(is_guide_packed(settings) && !is_guide_complete(settings)),
+        "FALLBACK_IS_BLACK" => f64::from(settings.coverage.fallback == Fallback::Black),
         // The template that names it means it.
         "ACCUMULATED" => 1.0,
         "LIGHT_CHANGE" => f64::from(features.light_change),

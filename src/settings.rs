@@ -35,8 +35,9 @@ impl Preset {
             }
             Preset::Reference => {
                 let mut settings = Settings { pipeline: Pipeline::Published, ..Settings::default() };
-                // GGX alpha 0.2.
+                // GGX alpha 0.2. Rougher surfaces keep their noise.
                 settings.coverage.roughness_threshold = 0.447_213_6;
+                settings.coverage.fallback = Fallback::Input;
                 settings
             }
         }
@@ -152,10 +153,10 @@ impl Default for Conventions {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fallback {
-    /// No radiance.
+    /// No radiance. Tiles that are left out altogether are written in two frames only, and cost nothing after.
+    #[default]
     Black,
     /// The noisy input as it is. Where only listed rays are traced, that is whatever the renderer left there.
-    #[default]
     Input,
     /// Black in the sky; elsewhere the `environment` input in the mirror direction, blurred by roughness.
     Environment,

@@ -97,7 +97,9 @@ fn comments_and_names_are_those_of_the_sources() {
 
 #[test]
 fn registers_can_be_moved() {
-    let (_, kernels) = Plan::new(&Settings::default(), UVec2::new(64, 64)).unwrap();
+    let mut settings = Settings::default();
+    settings.coverage.fallback = limpid::settings::Fallback::Input;
+    let (_, kernels) = Plan::new(&settings, UVec2::new(64, 64)).unwrap();
     let fill = kernels.iter().find(|kernel| kernel.name == "fill").unwrap();
     let hlsl = HlslOptions { first_space: 7, first_register: 10, vk_binding: true, ..HlslOptions::default() };
     let text = fill.hlsl(&hlsl).unwrap();

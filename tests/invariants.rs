@@ -359,6 +359,103 @@ fn the_sky_keeps_its_fallback() {
     });
 }
 
+/// What happens before a frame of a random sequence, or in it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Event {
+    Nothing,
+    Reset,
+    /// A frame is classified and never denoised.
+    Abandoned,
+    /// The frame uses a part of its textures.
+    Part,
+    Resize,
+    /// Settings that keep history: kernels, and what is left out.
+    NearTaps,
+    Threshold,
+    /// The other fallback.
+    Fallback,
+}
+
+/// Tiles of sky that come and go, each in its time.
+fn comes_and_goes(seed: u32, frame: u32, p: UVec2) -> bool {
+    let tile = p / 8;
+    let time = frame + (7.0 * noise(seed, tile)) as u32;
+    noise(seed + time / (1 + (4.0 * noise(seed ^ 99, tile)) as u32), tile) < 0.6
+}
+
+/// A texel of the output, and what it has to be if nothing is denoised there.
+type Texel = ([f32; 4], Option<[f32; 4]>);
+
+/// The texels of each frame of a sequence that begins with a fallback.
+fn run_of_events(pipeline: Pipeline, is_black: bool, seed: u32, events: &[Event]) -> Vec<Vec<Texel>> {
+    const SIZE: UVec2 = UVec2::new(45, 27);
+    const ROUGHNESS: f32 = 0.3;
+    let mut case = Case::still(SIZE, events.len() as u32, |frame, p| {
+        let depth = if comes_and_goes(seed, frame, p) { 0.0 } else { 4.0 };
+        // Exact in half floats.
+        let value = 1.0 + (noise(seed + frame, p) * 64.0).floor() / 64.0;
+        Pixel { radiance: [value; 4], roughness: ROUGHNESS, depth, ..Pixel::WALL }
+    });
+    case.settings.pipeline = pipeline;
+    let mut executor = Cpu::overwritten(WALL_WORD);
+    executor.start(case.core());
+    let frame = |(index, event): (usize, &Event)| {
+        let mut settings = case.settings.clone();
+        let is_black = is_black != (*event == Event::Fallback);
+        settings.coverage.fallback = if is_black { Fallback::Black } else { Fallback::Input };
+        let (images, mut frame) = (case.images(index), case.steps[index].frame.clone());
+        match event {
+            Event::Nothing | Event::Fallback => {}
+            Event::Reset => frame.reset = true,
+            Event::Abandoned => executor.abandon(&images, &frame),
+            Event::Part => frame.size = UVec2::new(34, 20),
+            Event::Resize => executor.resize(SIZE),
+            Event::NearTaps => settings.features.near_taps = 4,
+            Event::Threshold => settings.coverage.roughness_threshold = 0.2,
+        }
+        executor.set_settings(&settings);
+        let output = executor.frame(&images, &frame).output();
+        let expected = case.steps[index].images.pixels.iter().map(|pixel| {
+            let is_left_out = pixel.depth == 0.0 || ROUGHNESS > settings.coverage.roughness_threshold;
+            let [r, g, b, _] = pixel.radiance;
+            is_left_out.then_some(if is_black { [0.0; 4] } else { [r, g, b, 0.0] })
+        });
+        let texels = (0..).zip(output.into_iter().zip(expected));
+        let is_inside = |i: u32| UVec2::new(i % SIZE.x, i / SIZE.x).cmplt(frame.size).all();
+        texels.filter(|(index, _)| is_inside(*index)).map(|(_, texel)| texel).collect()
+    };
+    events.iter().enumerate().map(frame).collect()
+}
+
+/// Tiles that stay left out are not written again: nothing that comes between may make them stale, or let what they hold
+/// reach what is denoised.
+#[test]
+fn what_is_left_out_holds_its_fallback_whatever_happens() {
+    use Event::{Abandoned, Fallback, NearTaps, Nothing, Part, Reset, Resize, Threshold};
+    let event = prop_oneof![
+        4 => Just(Nothing),
+        1 => prop::sample::select(vec![Reset, Abandoned, Part, Resize, NearTaps, Threshold, Fallback]),
+    ];
+    let any = (any_pipeline(), 0u32..1000, prop::collection::vec(event, 8..20));
+    let (mut runner, _) = runner(file!(), 24);
+    let result = runner.run(&any, |(pipeline, seed, events)| {
+        let [black, input] = [true, false].map(|is_black| run_of_events(pipeline, is_black, seed, &events));
+        for (frame, (black, input)) in black.iter().zip(&input).enumerate() {
+            for (index, (black, input)) in black.iter().zip(input).enumerate() {
+                let is_as_expected = match (black, input) {
+                    ((a, Some(black)), (b, Some(input))) => a == black && b == input,
+                    ((a, _), (b, _)) => a == b,
+                };
+                prop_assert!(is_as_expected, "frame {}, texel {}: {:?}, {:?}", frame, index, black, input);
+            }
+        }
+        Ok(())
+    });
+    if let Err(error) = result {
+        panic!("{error}");
+    }
+}
+
 #[test]
 fn the_output_stays_between_the_darkest_and_the_brightest_input() {
     for_all(

@@ -307,7 +307,7 @@ fn constants_change_without_a_new_plan() {
     assert_eq!(denoiser.set_settings(&settings).unwrap(), Change::Kernels);
     assert_eq!(denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap().constants.prev_size, size.to_array());
     denoiser.finish_frame();
-    settings.coverage.fallback = Fallback::Black;
+    settings.coverage.fallback = Fallback::Input;
     assert_eq!(denoiser.set_settings(&settings).unwrap(), Change::Plan);
     assert_eq!(denoiser.next_frame(&FrameInputs::new(camera(), size)).unwrap().constants.prev_size, [0, 0]);
 }

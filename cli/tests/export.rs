@@ -50,7 +50,7 @@ fn folders_are_written_compared_and_replaced() {
         assert_eq!(bytes, fs::read(Path::new(other).join(file)).unwrap(), "{file}");
     }
     fails(&["--out", out], 1, &["exists", "--force", "--check"]);
-    let changed = ["--out", out, "--set", "coverage.fallback=black"];
+    let changed = ["--out", out, "--set", "coverage.fallback=input"];
     fails(&[&changed[..], &["--check"]].concat(), 1, &["out of date", "changed: hlsl/fill.hlsl"]);
     fs::remove_file(path.join("limpid.h")).unwrap();
     fails(&["--out", out, "--check"], 1, &["missing: limpid.h"]);

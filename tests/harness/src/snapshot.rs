@@ -3,16 +3,17 @@ use std::collections::BTreeMap;
 use glam::UVec2;
 use half::f16;
 use limpid::Plan;
-use limpid::resource::{Copy, Extent, Kind, Resource, TILE_SIZE};
+use limpid::resource::{Copy, Count, Extent, Kind, Resource, TILE_SIZE};
 
 /// All resources of limpid after a frame, as words, by name and copy.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Snapshot(pub BTreeMap<String, Vec<u32>>);
 
 impl Snapshot {
-    /// Reads what a plan names and can be read, by functions that read a texture and a buffer.
+    /// Reads what a plan names and can be read after a frame of a size, by functions that read a texture and a buffer.
     pub fn take(
         plan: &Plan,
+        frame: UVec2,
         is_readable: impl Fn(&Resource) -> bool,
         mut texture: impl FnMut(&str, Copy) -> Vec<u32>,
         mut buffer: impl FnMut(&str) -> Vec<u32>,
@@ -40,21 +41,24 @@ impl Snapshot {
             }
         }
         let mut this = Self(words);
-        this.sort_lists();
+        this.sort_lists(frame);
         this
     }
 
     /// Lists are in the order in which workgroups happened to run.
-    fn sort_lists(&mut self) {
+    fn sort_lists(&mut self, frame: UVec2) {
         let Some(args) = self.0.get("args") else { return };
         let [listed, left_out, rays] = [3, 7, 11].map(|word| args.get(word).map_or(0, |&count| count as usize));
         if let Some(tiles) = self.0.get_mut("tiles") {
-            let count = tiles.len();
-            tiles[..listed.min(count)].sort_unstable();
             // Left-out tiles grow from the end of what this frame uses.
-            tiles[listed.min(count)..(listed + left_out).min(count)].sort_unstable();
-            // What lies behind is of earlier frames.
-            tiles[(listed + left_out).min(count)..].fill(0);
+            let end = (Count::Per(Extent::Tile).of(frame) as usize).min(tiles.len());
+            let listed = listed.min(end);
+            let left_out = end - left_out.min(end - listed);
+            tiles[..listed].sort_unstable();
+            tiles[left_out..end].sort_unstable();
+            // The rest is of earlier frames.
+            tiles[listed..left_out].fill(0);
+            tiles[end..].fill(0);
         }
         if let Some(list) = self.0.get_mut("rays") {
             let count = list.len();
@@ -66,11 +70,11 @@ impl Snapshot {
     /// Where there is no guide to tell which pixels were denoised, notes those of listed tiles as `listed`. `size` is that of
     /// the textures, `frame` that of the frame.
     pub(crate) fn note_listed(&mut self, size: UVec2, frame: UVec2) {
-        let Some(flags) = self.0.get("tile_flags").filter(|_| !self.0.contains_key("guide")) else { return };
-        let row = Extent::Tile.of(size).x;
+        let Some(idle) = self.0.get("idle_frames").filter(|_| !self.0.contains_key("guide")) else { return };
+        let row = Extent::Tile.of(frame).x;
         let positions = (0..size.y).flat_map(|y| (0..size.x).map(move |x| UVec2::new(x, y)));
-        let flag = |p: UVec2| flags[(p.y / TILE_SIZE * row + p.x / TILE_SIZE) as usize];
-        let listed = positions.map(|p| if p.cmplt(frame).all() { flag(p) } else { 0 }).collect();
+        let is_listed = |p: UVec2| idle[(p.y / TILE_SIZE * row + p.x / TILE_SIZE) as usize] == 0;
+        let listed = positions.map(|p| u32::from(p.cmplt(frame).all() && is_listed(p))).collect();
         self.0.insert("listed".to_owned(), listed);
     }
 

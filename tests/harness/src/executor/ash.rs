@@ -128,6 +128,7 @@ impl Executor for Ash {
         let words = |bytes: Vec<u8>| bytemuck::pod_collect_to_vec::<u8, u32>(&bytes);
         Snapshot::take(
             denoiser.plan(),
+            frame.size,
             |resource| resource.exported || self.options.readable_intermediates,
             |name, copy| words(context.read_image(&denoiser.intermediate_image(name, copy).unwrap()).unwrap()),
             |name| {

@@ -35,11 +35,36 @@ impl Cpu {
         Self { overwritten: Some(word), ..Self::default() }
     }
 
+    /// Classifies a frame that is never denoised.
+    pub fn abandon(&mut self, images: &[Image], frame: &FrameInputs) {
+        let denoiser = self.denoiser.as_mut().unwrap();
+        with_inputs(images, |inputs| denoiser.run_classify(inputs, frame).unwrap());
+    }
+
     /// What kernels did that they must not, as text.
     pub fn faults(&self) -> Vec<String> {
         let faults = self.denoiser.iter().flat_map(Denoiser::faults);
         faults.map(|(kernel, place, fault)| format!("{kernel} {place} {fault:?}")).collect()
     }
+}
+
+fn with_inputs(images: &[Image], run: impl FnOnce(&Inputs<'_>)) {
+    let textures: Vec<_> = images.iter().map(|image| (image.name, texture(image))).collect();
+    let find = |name| &textures.iter().find(|(n, _)| *n == name).unwrap().1;
+    run(&Inputs {
+        radiance: find("radiance"),
+        normal: find("normal"),
+        roughness: find("roughness"),
+        depth: find("depth"),
+        motion: find("motion"),
+        hit_motion: Some(find("hit_motion")),
+        environment: Some(find("environment")),
+        previous: Some(PrevGbuffer {
+            normal: find("prev_normal"),
+            roughness: find("prev_roughness"),
+            depth: find("prev_depth"),
+        }),
+    });
 }
 
 fn texture(image: &Image) -> Texture {
@@ -88,29 +113,14 @@ impl Executor for Cpu {
     }
 
     fn frame(&mut self, images: &[Image], frame: &FrameInputs) -> Snapshot {
-        let textures: Vec<_> = images.iter().map(|image| (image.name, texture(image))).collect();
-        let find = |name| &textures.iter().find(|(n, _)| *n == name).unwrap().1;
-        let inputs = Inputs {
-            radiance: find("radiance"),
-            normal: find("normal"),
-            roughness: find("roughness"),
-            depth: find("depth"),
-            motion: find("motion"),
-            hit_motion: Some(find("hit_motion")),
-            environment: Some(find("environment")),
-            previous: Some(PrevGbuffer {
-                normal: find("prev_normal"),
-                roughness: find("prev_roughness"),
-                depth: find("prev_depth"),
-            }),
-        };
         let denoiser = self.denoiser.as_mut().unwrap();
         if let Some(word) = self.overwritten {
             denoiser.overwrite_transient(word);
         }
-        denoiser.denoise(&inputs, frame).unwrap();
+        with_inputs(images, |inputs| denoiser.denoise(inputs, frame).unwrap());
         Snapshot::take(
             denoiser.plan(),
+            frame.size,
             |_| true,
             |name, copy| denoiser.intermediate_texture(name, copy).unwrap().read(),
             |name| denoiser.intermediate_buffer(name).unwrap().read(),

@@ -134,6 +134,7 @@ impl Executor for Wgpu {
         self.queue.submit([encoder.finish()]);
         let snapshot = Snapshot::take(
             denoiser.plan(),
+            frame.size,
             |_| true,
             |name, copy| self.read_texture(denoiser.intermediate_texture(name, copy).unwrap()),
             |name| self.read_buffer(denoiser.intermediate_buffer(name).unwrap()),
