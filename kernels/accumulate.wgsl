@@ -74,6 +74,10 @@ const MIRROR_UP_TO: f32 = 0.03;
 // Outliers of which there are two count up to so many times what bounds single ones, against the third sample of their
 // block and history. What is above is lost.
 const PAIR_FACTOR: f32 = 12.0;
+// History counts up to so many times what bounds single outliers, against the blocks around, for each frame that it
+// holds, from this roughness on: below, what lobes see has edges.
+const UNSEEN_FACTOR: f32 = 4.0;
+const UNSEEN_FROM: f32 = 0.1;
 // Deviation that a sample counts as having of which no block says one.
 const ALONE_DEVIATION: f32 = 0.1;
 
@@ -367,6 +371,10 @@ fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
         found.radiance = select(found.radiance, bounded, guide.roughness < frame.accumulate_clip_roughness);
     }
     if OUTLIER_SPREAD {
+        // What one frame saw, and none sees again.
+        let seen = UNSEEN_FACTOR * frame.outlier_factor * found.length * luminance(subject.around.mean);
+        let bound = min(1.0, seen / luminance(found.radiance));
+        found.radiance *= select(1.0, bound, guide.roughness >= UNSEEN_FROM);
         // Two outliers in a block hide each other.
         let expected = max(peaks_of(pixel).y, luminance(found.radiance));
         let limit = min(1.0, PAIR_FACTOR * frame.outlier_factor * expected / luminance(radiance));
