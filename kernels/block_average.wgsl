@@ -148,7 +148,7 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
     }
     block.deviation = sqrt(variance);
     if SAMPLES_ARE_USED {
-        let peaks = min(choice.peaks.yz, vec2<f32>(HALF_MAX));
+        let peaks = min(vec2<f32>(choice.peaks.y, choice.peaks.z), vec2<f32>(HALF_MAX));
         let brightness_and_weight = vec2<f32>(moments.x, squared_weight * normalization * normalization);
         textureStore(out_samples, block_index, vec4<u32>(pack2x16float(peaks), pack2x16float(brightness_and_weight), 0u, 0u));
     }

@@ -218,5 +218,5 @@ fn limpids_own_barriers() {
     check(&plan).unwrap();
     assert_eq!(plan.barriers().iter().flatten().count(), 10);
     // `fill` only needs what came before `reproject` and runs beside `prefilter`.
-    assert_eq!(passes, ["classify", "list_tiles", "indirect_args", "reproject", "prefilter", "resolve_temporal"]);
+    assert_eq!(passes, ["list_tiles", "indirect_args", "reproject", "prefilter", "resolve_temporal"]);
 }

@@ -3,7 +3,7 @@
 
 use glam::UVec2;
 use limpid::plan::Plan;
-use limpid::resource::{Access, Copy};
+use limpid::resource::Access;
 use limpid::settings::{Fallback, Pipeline, RayList};
 use limpid::{DebugView, Denoiser, Preset, Settings};
 use limpid_harness::executor::{Ash, AshOptions};
@@ -112,10 +112,11 @@ fn a_missing_barrier_is_reported() {
     let mut case = Case::still(SIZE, 3, noisy);
     case.settings.pipeline = Pipeline::Published;
     let (mut plan, kernels) = Plan::new(&case.settings, SIZE).unwrap();
-    // The plan says that prefilter writes nothing, so resolve_temporal does not wait for it.
-    let prefilter = plan.passes.iter_mut().find(|pass| pass.kernel == "prefilter").unwrap();
-    for bound in prefilter.bindings.iter_mut().filter(|bound| bound.copy == Copy::Previous) {
-        bound.access = Access::Read;
+    // The plan says that prefilter and fill write nothing, so resolve_temporal does not wait for them.
+    for pass in plan.passes.iter_mut().filter(|pass| ["prefilter", "fill"].contains(&pass.kernel.as_str())) {
+        for bound in pass.bindings.iter_mut().filter(|bound| bound.access.writes()) {
+            bound.access = Access::Read;
+        }
     }
     case.run_plan(&mut ash, Denoiser::with_plan(&case.settings, plan, kernels));
     let messages = ash.messages();

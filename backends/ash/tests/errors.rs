@@ -70,9 +70,9 @@ fn whatever_allocation_fails_nothing_leaks() {
         assert_eq!(context.allocated_bytes(), 0);
         blocks += 1;
     }
-    // Pairs of history and light, two of blocks, guide, last frame's guide, samples where tile flags were, tiles,
-    // counters, args, constants.
-    assert_eq!(blocks, 13);
+    // Pairs of history and light, two of blocks, guide, last frame's guide, samples, idle frames, tiles, counters, args,
+    // constants.
+    assert_eq!(blocks, 14);
     assert_eq!(context.allocated_bytes(), 0);
     assert_eq!(context.messages(), Vec::<String>::new());
 }
