@@ -29,6 +29,9 @@ override FRINGE_IS_CLEARED: bool = false;
 @group(1) @binding(5) var out_guide: texture_storage_2d<rg32uint, write>;
 
 fn fill_pixel(pixel: vec2<u32>) {
+    if any(pixel >= frame.size) {
+        return;
+    }
     // Only the environment needs the surface.
     var guide: Guide;
     if FALLBACK == 2u {
@@ -47,8 +50,8 @@ fn entry_at(index: u32) -> u32 {
 }
 
 // The pixel that a lane handles in a tile of the list.
-fn pixel_of(index: u32, lane: u32) -> vec2<u32> {
-    return unpack_tile(entry_at(index)) * TILE_SIZE + lane_position(lane);
+fn pixel_of(entry: u32, lane: u32) -> vec2<u32> {
+    return unpack_tile(entry) * TILE_SIZE + lane_position(lane);
 }
 
 @compute @workgroup_size(8, 8)
@@ -60,18 +63,22 @@ fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
     var fringe = 0u;
     for (var i = 0u; i < count; i++) {
         let entry = entry_at(first + i);
-        unfilled |= select(0u, 1u << i, (entry & TILE_IS_UNFILLED) != 0u);
         fringe |= select(0u, 1u << i, (entry & TILE_IS_FRINGE) != 0u);
+        // What is not black changes in every frame.
+        if FALLBACK == 0u {
+            unfilled |= select(0u, 1u << i, (entry & TILE_IS_UNFILLED) != 0u);
+        } else {
+            fill_pixel(pixel_of(entry, lane));
+        }
     }
-    for (var left = unfilled; left != 0u; left &= left - 1u) {
-        let pixel = pixel_of(first + lowest_bit(left), lane);
-        if all(pixel < frame.size) {
-            fill_pixel(pixel);
+    if FALLBACK == 0u {
+        for (var left = unfilled; left != 0u; left &= left - 1u) {
+            fill_pixel(pixel_of(entry_at(first + lowest_bit(left)), lane));
         }
     }
     if FRINGE_IS_CLEARED {
         for (var left = fringe; left != 0u; left &= left - 1u) {
-            let pixel = pixel_of(first + lowest_bit(left), lane);
+            let pixel = pixel_of(entry_at(first + lowest_bit(left)), lane);
             if all(pixel < frame.size) {
                 textureStore(out_guide, pixel, vec4<u32>(0u));
             }

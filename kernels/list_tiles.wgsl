@@ -59,12 +59,12 @@ fn clear_tile(tile: vec2<u32>) {
 // Whether one of the tiles around is listed.
 fn is_fringe(tile: vec2<u32>) -> bool {
     let last = vec2<i32>(tile_counts()) - 1;
-    var found = false;
+    var fewest = 1u;
     for (var i = 0; i < 9; i++) {
         let at = clamp(vec2<i32>(tile) + vec2<i32>(i % 3, i / 3) - 1, vec2<i32>(0), last);
-        found = found || in_idle_frames[tile_index(vec2<u32>(at))] == 0u;
+        fewest = min(fewest, in_idle_frames[tile_index(vec2<u32>(at))]);
     }
-    return found;
+    return fewest == 0u;
 }
 
 // What `fill` has to do in a tile that is left out.

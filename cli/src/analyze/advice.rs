@@ -224,7 +224,7 @@ fn cost_findings(content: &Content) -> Vec<Finding> {
         );
         let advice = format!(
             "with coverage.roughness_threshold = {PUBLISHED_THRESHOLD:.3} and another source of light there, {} of tiles \
-             cost nothing but a fill",
+             cost nothing but a look at them",
             percent(content.tiles_above_published_threshold)
         );
         all.push(finding(Severity::Note, found, advice));
