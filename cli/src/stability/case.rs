@@ -1,7 +1,7 @@
 //! A sequence of images that stresses numbers, as functions of frame and pixel.
 
 use glam::{Mat4, UVec2, Vec2, Vec3, camera::rh};
-use limpid::settings::DepthEncoding;
+use limpid::settings::{DepthEncoding, Fallback};
 use limpid::{Camera, Settings};
 
 use crate::sequence::Frame;
@@ -191,9 +191,11 @@ impl Case {
         self
     }
 
-    /// The preset's settings as this case has them; depth is linear unless the case says otherwise.
+    /// The preset's settings as this case has them; depth is linear unless the case says otherwise, and what is left out
+    /// keeps its input, so that bounds of radiance say something of it too.
     pub fn settings_of(&self, preset: limpid::Preset) -> Settings {
         let mut settings = preset.settings();
+        settings.coverage.fallback = Fallback::Input;
         settings.conventions.depth = DepthEncoding::Linear;
         (self.settings)(&mut settings);
         settings
