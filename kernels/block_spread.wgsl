@@ -5,7 +5,7 @@
 //! out  blocks   rgba32uint   block   with its excess, or its radiance, filtered
 //!
 //! Grid: one invocation a block, workgroups of the blocks of 16 listed tiles (indirect).
-//! Up to 81 taps on a grid that stretches with the footprint; narrow footprints take fewer.
+//! Up to 2 WIDE_TAPS + 1 taps a side, 81 in all, on a grid that stretches with the footprint; narrow ones take fewer.
 
 import package::shared::frame;
 import package::shared::packing;

@@ -124,10 +124,10 @@ fn block_statistics(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invo
         let calmer = min(variance, known.deviation * known.deviation);
         let error = sqrt(calmer * squared_weight * KNOWN_VARIANCE) * normalization;
         let tolerance = frame.light_change_sigma * error + frame.light_change_share * known.brightness + LIGHT_FLOOR;
-        let excess = abs(sample_moments.x - known.brightness) / tolerance;
+        let change = abs(sample_moments.x - known.brightness) / tolerance;
         let is_known = known.brightness > 0.0;
         var light: Light;
-        light.changed = select(0.0, smoothstep(1.0, 2.0, excess), is_known);
+        light.changed = select(0.0, smoothstep(1.0, 2.0, change), is_known);
         let rate = select(1.0, max(frame.light_change_rate, light.changed), is_known);
         light.brightness = mix(known.brightness, sample_moments.x, rate);
         light.deviation = sqrt(mix(known.deviation * known.deviation, variance, rate));
