@@ -6,8 +6,7 @@
 //! out  guide        rg32uint      full   packed normal, linear depth, roughness, left-out flag (packed guide); where no
 //!                                        later pass looks at surfaces that are left out, in tiles that are denoised
 //!                                        only, 0 if left out
-//! in/out  idle_frames   u32       tile   0 if a pixel of the tile is denoised, else 1; with black fallback the frames in a
-//!                                        row in which none was, up to 3
+//! in/out  idle_frames   u32       tile   frames in a row in which no pixel of the tile was denoised, up to 3
 //! out  rays         u32 list      pixels to trace and where to copy the result (ray list only)
 //! out  counters     4 x u32       rays (ray list only)
 //!
@@ -27,8 +26,6 @@ override RAYS_PER_QUAD: u32 = 0u;
 override RAYS_FOLLOW_VARIANCE: bool = false;
 // Later passes look at surfaces that are left out, too.
 override GUIDE_IS_COMPLETE: bool = true;
-// What is left out looks the same in every frame.
-override FALLBACK_IS_BLACK: bool = false;
 
 @group(1) @binding(0) var in_history: texture_2d<f32>;
 @group(1) @binding(1) var out_guide: texture_storage_2d<rg32uint, write>;
@@ -130,12 +127,8 @@ fn tiles_with_surface(group: vec2<u32>, lane: u32, on_screen: u32, encoding: Dep
 // Counts the frames in a row in which nothing was denoised in a tile. Without history of the frame's size it is the first.
 fn count_idle_frames(tile: vec2<u32>, is_listed: bool) {
     let index = tile_index(tile);
-    var frames = 1u;
-    if FALLBACK_IS_BLACK {
-        let last = select(0u, inout_idle_frames[index], all(frame.prev_size == frame.size));
-        frames = min(last, FRAMES_TO_FILL) + 1u;
-    }
-    inout_idle_frames[index] = select(frames, 0u, is_listed);
+    let last = select(0u, inout_idle_frames[index], all(frame.prev_size == frame.size));
+    inout_idle_frames[index] = select(min(last, FRAMES_TO_FILL) + 1u, 0u, is_listed);
 }
 
 fn store_guide(pixel: vec2<u32>, packed: vec2<u32>) {

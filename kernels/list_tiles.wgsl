@@ -3,8 +3,8 @@
 //!
 //! in      idle_frames            u32           tile    frames in a row in which nothing was denoised, 0 for listed tiles
 //! in/out  counters               4 x u32       listed tiles, left-out tiles that `fill` writes
-//! out     tiles                  u32 list      listed tiles from the front; those left-out tiles from the back, with marks
-//!                                              where the output has to be filled and where a neighbour is listed
+//! out     tiles                  u32 list      listed tiles from the front; those left-out tiles from the back, with a mark
+//!                                              on new ones. Where the fallback is black there are no others
 //! out     average                rgba16float   tile    0 in tiles that are left out (published pipeline)
 //! out     blocks, other_blocks   rgba32uint    block   the same (footprint pipeline)
 //! out     light                  r32uint       block   the same (light change)
@@ -23,8 +23,8 @@ override AVERAGE_IS_USED: bool = true;
 override BLOCKS_ARE_USED: bool = false;
 // Later passes notice where the light changed.
 override LIGHT_CHANGE: bool = false;
-// The guide has to be cleared beside listed tiles.
-override FRINGE_IS_CLEARED: bool = false;
+// Left-out tiles stay as they are once they are no longer new.
+override FALLBACK_IS_BLACK: bool = false;
 
 @group(1) @binding(0) var<storage, read> in_idle_frames: array<u32>;
 @group(1) @binding(1) var<storage, read_write> out_tiles: array<u32>;
@@ -56,26 +56,6 @@ fn clear_tile(tile: vec2<u32>) {
     }
 }
 
-// Whether one of the tiles around is listed.
-fn is_fringe(tile: vec2<u32>) -> bool {
-    let last = vec2<i32>(tile_counts()) - 1;
-    var fewest = 1u;
-    for (var i = 0; i < 9; i++) {
-        let at = clamp(vec2<i32>(tile) + vec2<i32>(i % 3, i / 3) - 1, vec2<i32>(0), last);
-        fewest = min(fewest, in_idle_frames[tile_index(vec2<u32>(at))]);
-    }
-    return fewest == 0u;
-}
-
-// What `fill` has to do in a tile that is left out.
-fn marks_of(tile: vec2<u32>, idle_frames: u32) -> u32 {
-    var marks = select(0u, TILE_IS_UNFILLED, idle_frames <= FRAMES_TO_FILL);
-    if FRINGE_IS_CLEARED {
-        marks |= select(0u, TILE_IS_FRINGE, is_fringe(tile));
-    }
-    return marks;
-}
-
 @compute @workgroup_size(8, 8)
 fn list_tiles(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
     let tile = id.xy;
@@ -88,12 +68,14 @@ fn list_tiles(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invoc
     let idle_frames = in_idle_frames[tile_index(min(tile, counts - 1u))];
     let is_listed = idle_frames == 0u;
     let list = select(1u, 0u, is_listed);
-    var marks = 0u;
+    let is_new = !is_listed && idle_frames <= FRAMES_TO_FILL;
     if on_screen && !is_listed {
         clear_tile(tile);
-        marks = marks_of(tile, idle_frames);
     }
-    let is_noted = on_screen && (is_listed || marks != 0u);
+    var is_noted = on_screen;
+    if FALLBACK_IS_BLACK {
+        is_noted = on_screen && (is_listed || is_new);
+    }
     var index = 0u;
     if is_noted {
         index = atomicAdd(&group_counts[list], 1u);
@@ -105,6 +87,6 @@ fn list_tiles(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invoc
     workgroupBarrier();
     if is_noted {
         index += group_first[list];
-        out_tiles[select(counts.x * counts.y - 1u - index, index, is_listed)] = pack_tile(tile) | marks;
+        out_tiles[select(counts.x * counts.y - 1u - index, index, is_listed)] = pack_tile(tile) | select(0u, TILE_IS_NEW, is_new);
     }
 }

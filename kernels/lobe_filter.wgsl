@@ -133,7 +133,8 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
         let brighter = brightness(radiance) - own_brightness;
         let penalty = plane_penalty(plane, tap, vec2<f32>(texel) + 0.5) + dot(rho, rho) + apart * apart
             + noise_falloff * brighter * brighter;
-        let counts = tap.denoised && all(at == texel) && any(at != vec2<i32>(pixel));
+        // Without a length it is what `fill` left in a tile in which the guide may say anything.
+        let counts = tap.denoised && history.length > 0.0 && all(at == texel) && any(at != vec2<i32>(pixel));
         let w = select(0.0, trust(history.length) * exp(-penalty), counts);
         sum += vec4<f32>(select(vec3<f32>(0.0), kept, counts), 1.0) * w;
         let counted = select(0.0, l, counts);

@@ -82,7 +82,7 @@ const FILL: PassTemplate = PassTemplate {
     is_needed: always,
     stage: Stage::Denoise,
     grid: GridTemplate::List(1),
-    overrides: &["FALLBACK", "PREV_GUIDE_IS_KEPT", "FRINGE_IS_CLEARED"],
+    overrides: &["FALLBACK", "PREV_GUIDE_IS_KEPT", "GUIDE_IS_CLEARED"],
     bindings: &[
         ("in_radiance", "radiance", Current),
         ("in_environment", "environment", Current),
@@ -104,7 +104,7 @@ const PASSES: &[PassTemplate] = &[
         is_needed: always,
         stage: Stage::Classify,
         grid: GridTemplate::Tiles(4),
-        overrides: &["RAYS_PER_QUAD", "RAYS_FOLLOW_VARIANCE", "GUIDE_IS_COMPLETE", "FALLBACK_IS_BLACK"],
+        overrides: &["RAYS_PER_QUAD", "RAYS_FOLLOW_VARIANCE", "GUIDE_IS_COMPLETE"],
         bindings: &[
             ("in_history", LAST_OUTPUT, Current),
             ("out_guide", "guide", Current),
@@ -119,7 +119,7 @@ const PASSES: &[PassTemplate] = &[
         is_needed: always,
         stage: Stage::Classify,
         grid: GridTemplate::Tiles(8),
-        overrides: &["AVERAGE_IS_USED", "BLOCKS_ARE_USED", "LIGHT_CHANGE", "FRINGE_IS_CLEARED"],
+        overrides: &["AVERAGE_IS_USED", "BLOCKS_ARE_USED", "LIGHT_CHANGE", "FALLBACK_IS_BLACK"],
         bindings: &[
             ("in_idle_frames", "idle_frames", Current),
             ("out_tiles", "tiles", Current),
@@ -479,7 +479,7 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
             f64::from(settings.pipeline == Pipeline::Footprint && has_blocks)
         }
         "GUIDE_IS_COMPLETE" => f64::from(is_guide_complete(settings)),
-        "FRINGE_IS_CLEARED" => f64::from(is_guide_packed(settings) && !is_guide_complete(settings)),
+        "GUIDE_IS_CLEARED" => f64::from(is_guide_packed(settings) && !is_guide_complete(settings)),
         "FALLBACK_IS_BLACK" => f64::from(settings.coverage.fallback == Fallback::Black),
         // The template that names it means it.
         "ACCUMULATED" => 1.0,

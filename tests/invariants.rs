@@ -389,15 +389,16 @@ type Texel = ([f32; 4], Option<[f32; 4]>);
 /// The texels of each frame of a sequence that begins with a fallback.
 fn run_of_events(pipeline: Pipeline, is_black: bool, seed: u32, events: &[Event]) -> Vec<Vec<Texel>> {
     const SIZE: UVec2 = UVec2::new(45, 27);
-    const ROUGHNESS: f32 = 0.3;
+    const ROUGHNESS: f32 = 0.25;
     let mut case = Case::still(SIZE, events.len() as u32, |frame, p| {
-        let depth = if comes_and_goes(seed, frame, p) { 0.0 } else { 4.0 };
+        // The surface of `WALL_WORD`, which memory holds in one of two runs.
+        let depth = if comes_and_goes(seed, frame, p) { 0.0 } else { 2.5 };
         // Exact in half floats.
         let value = 1.0 + (noise(seed + frame, p) * 64.0).floor() / 64.0;
         Pixel { radiance: [value; 4], roughness: ROUGHNESS, depth, ..Pixel::WALL }
     });
     case.settings.pipeline = pipeline;
-    let mut executor = Cpu::overwritten(WALL_WORD);
+    let mut executor = Cpu::overwritten(if is_black { WALL_WORD } else { 0 });
     executor.start(case.core());
     let frame = |(index, event): (usize, &Event)| {
         let mut settings = case.settings.clone();

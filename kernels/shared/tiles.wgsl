@@ -22,17 +22,15 @@ fn tile_index(tile: vec2<u32>) -> u32 {
 
 // Frames in a row after which what a tile that is left out holds lasts: the output may be one of two textures in turn.
 const FRAMES_TO_FILL: u32 = 2u;
-// Set in the list of tiles that are left out where the output has to be filled, and where a neighbour is denoised.
-const TILE_IS_UNFILLED: u32 = 0x8000u;
-const TILE_IS_FRINGE: u32 = 0x80000000u;
+// Set in the list of tiles that are left out for those in which that does not last yet.
+const TILE_IS_NEW: u32 = 0x80000000u;
 
 fn pack_tile(tile: vec2<u32>) -> u32 {
     return tile.x | (tile.y << 16u);
 }
 
 fn unpack_tile(packed: u32) -> vec2<u32> {
-    let place = packed & ~(TILE_IS_UNFILLED | TILE_IS_FRINGE);
-    return vec2<u32>(place & 0xffffu, place >> 16u);
+    return vec2<u32>(packed & 0xffffu, (packed & ~TILE_IS_NEW) >> 16u);
 }
 
 // Tiles of their list that a workgroup of 64 invocations handles in `fill` and in passes over blocks of 4x4 pixels, in

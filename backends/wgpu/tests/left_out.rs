@@ -94,21 +94,25 @@ fn left_out_pixels_are_black_or_as_they_came() {
 #[test]
 fn an_image_without_any_reflection_is_all_fallback() {
     let Some(gpu) = Gpu::open() else { return };
-    settings(Fallback::Input).iter().for_each(|settings| assert_is_all_fallback(&gpu, settings));
+    let all = [Fallback::Black, Fallback::Input].into_iter().flat_map(settings);
+    all.for_each(|settings| assert_is_all_fallback(&gpu, &settings));
 }
 
 fn assert_is_all_fallback(gpu: &Gpu, settings: &Settings) {
     let mut run = Run::new(gpu, settings, SIZE);
-    // Everything denoised, then nothing, nothing but sky, and everything again: history starts anew.
-    for (seed, kind) in [Kind::Denoised, Kind::TooRough, Kind::Sky, Kind::Denoised].into_iter().enumerate() {
+    use Kind::{Denoised, Sky, TooRough};
+    // Everything denoised, then nothing, and everything again: history starts anew. So it does after nothing but sky.
+    for (seed, kind) in [Denoised, TooRough, Denoised, TooRough, Sky, Denoised].into_iter().enumerate() {
         let scene = mixed_scene(seed as u32, |_| kind);
         let denoised = run.frame(&scene, &frame());
-        if kind == Kind::Denoised {
+        if kind == Denoised {
             denoised.assert_usable("everything denoised");
             assert!(denoised.length.iter().all(|length| *length == 1.0), "frame {seed}");
         } else {
             for (texel, pixel) in denoised.output.iter().zip(&scene.pixels) {
-                assert_eq!(*texel, pixel.radiance.extend(0.0).to_array(), "frame {seed}");
+                let is_black = settings.coverage.fallback == Fallback::Black;
+                let expected = if is_black { Vec3::ZERO } else { pixel.radiance };
+                assert_eq!(*texel, expected.extend(0.0).to_array(), "frame {seed}");
             }
         }
     }
