@@ -36,7 +36,7 @@
 //! | radiance | linear, along the reflected ray, **before** it is multiplied by BRDF, Fresnel or albedo; negative counts as 0, NaN and infinity as no light |
 //! | hit distance | alpha of `radiance`: world-space distance from the surface to what the ray hit; for a miss a large finite number, such as 10000 |
 //! | depth | [`DepthEncoding`](settings::DepthEncoding): device depth, or linear distance along the view axis. Sky is the far plane, or 0 when linear |
-//! | normal | world space, [`NormalEncoding`](settings::NormalEncoding); a pixel with a zero or non-finite normal counts as sky |
+//! | normal | world space, [`NormalEncoding`](settings::NormalEncoding); a pixel with a zero or non-finite normal counts as sky. Not without the feature `normal_input` |
 //! | roughness | perceptual or GGX alpha (perceptual squared); a pixel where it is not finite counts as sky |
 //! | motion | `uv_now - uv_before` of the surface after multiplication by `motion_scale`, object motion included: `previous = uv - motion * scale` |
 //! | hit motion | optional: world-space position of what the reflected ray hit, minus its position last frame; 0 for sky and what rests; NaN and infinity count as 0 |

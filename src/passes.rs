@@ -54,6 +54,7 @@ pub(crate) const GBUFFER_OVERRIDES: &[&str] = &[
     "ROUGHNESS_IS_CONSTANT",
     "GUIDE_IS_PACKED",
     "GBUFFER_IS_COPIED",
+    "NORMAL_IS_INPUT",
 ];
 
 /// A pass before it is known which of its bindings the specialised kernel keeps.
@@ -389,8 +390,7 @@ fn has_debug_view(settings: &Settings) -> bool {
 
 /// The published pipeline's copy of the G-buffer is the packed guide.
 fn is_guide_packed(settings: &Settings) -> bool {
-    let features = &settings.features;
-    features.packed_guide || settings.pipeline == Pipeline::Published && features.gbuffer_copy
+    settings.features.packs_guide(settings.pipeline)
 }
 
 /// The published pipeline looks at last frame's surfaces, denoised or not.
@@ -472,6 +472,7 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         "ROUGHNESS_IS_CONSTANT" => f64::from(features.constant_roughness.is_some()),
         "GUIDE_IS_PACKED" => f64::from(is_guide_packed(settings)),
         "GBUFFER_IS_COPIED" => f64::from(features.gbuffer_copy),
+        "NORMAL_IS_INPUT" => f64::from(features.normal_input),
         "AVERAGE_IS_USED" => f64::from(settings.pipeline == Pipeline::Published && features.uses_average()),
         "PREV_GUIDE_IS_KEPT" => f64::from(settings.pipeline == Pipeline::Footprint && features.gbuffer_copy),
         "BLOCKS_ARE_USED" => {

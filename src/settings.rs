@@ -292,6 +292,10 @@ pub struct Features {
     /// Footprint pipeline: most blocks on either side of a block, along and across the footprint, that filters over
     /// blocks read, 1 to 16. What lies between is passed over where footprints are wider.
     pub wide_taps: u32,
+    /// Reads normals from the input `normal`. Without it they are the slope of `depth`, found once: only with
+    /// `gbuffer_copy` and `packed_guide`. Normal maps and smooth shading are lost then, and `depth` has to be as precise as
+    /// 32 bits are.
+    pub normal_input: bool,
     /// Perceptual roughness, 0 to 1, where it is the same everywhere: then there is no `roughness` input.
     pub constant_roughness: Option<f32>,
     /// Keeps what the next frame needs of the G-buffer. Without it the renderer, which double-buffers its own,
@@ -322,6 +326,7 @@ impl Default for Features {
             wide_filter: true,
             near_taps: 12,
             wide_taps: 4,
+            normal_input: true,
             constant_roughness: None,
             gbuffer_copy: true,
             packed_guide: true,
@@ -336,6 +341,11 @@ impl Features {
         self.spatial_filter || self.history_clip || self.average_mixing
     }
 
+    /// Whether `classify` packs what it decodes. The published pipeline's copy of the G-buffer is the packed guide.
+    pub(crate) fn packs_guide(&self, pipeline: Pipeline) -> bool {
+        self.packed_guide || pipeline == Pipeline::Published && self.gbuffer_copy
+    }
+
     /// Whether `accumulate` reads the blocks of the input.
     pub(crate) fn compares_with_blocks(&self) -> bool {
         self.block_statistics || self.outlier_spread
@@ -345,6 +355,11 @@ impl Features {
         let refuse = |reason| Err(Error::Features { reason });
         if !self.mirror_parallax && !self.surface_motion {
             return refuse("without mirror_parallax and surface_motion there is no history to find");
+        }
+        if !self.normal_input && !(self.gbuffer_copy && self.packs_guide(pipeline)) {
+            return refuse(
+                "without normal_input normals are found once and kept: gbuffer_copy and packed_guide have to be on",
+            );
         }
         if self.debug_view == Some(DebugView::MotionError) && !self.surface_motion {
             return refuse("the debug view motion-error needs motion vectors, which are read with surface_motion only");

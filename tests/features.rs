@@ -28,6 +28,9 @@ const READ_INSTEAD: [(&str, Change); 3] = [
     ("both", |features| (features.gbuffer_copy, features.packed_guide) = (false, false)),
 ];
 
+/// An image less in exchange for instructions.
+const DERIVED: Change = |features| features.normal_input = false;
+
 /// Those that one of them has besides.
 fn off(pipeline: Pipeline) -> Vec<(&'static str, Change)> {
     let published: [(&str, Change); 3] = [
@@ -137,6 +140,29 @@ fn what_is_read_instead_of_kept_costs_less_memory() {
                 assert!(without.is_within(&reading), "{other_name} with {name}");
             }
         }
+    }
+}
+
+/// Nothing but the image of normals disappears, and only `classify` grows.
+#[test]
+fn normals_from_depth_are_an_image_less() {
+    for pipeline in [Pipeline::Footprint, Pipeline::Published] {
+        let (everything, derived) = (Cost::of(&with(pipeline, &[])), Cost::of(&with(pipeline, &[DERIVED])));
+        assert_eq!((derived.bytes, derived.bindings() + 1), (everything.bytes, everything.bindings()));
+        for (with, without) in derived.passes.iter().zip(&everything.passes) {
+            assert!(with == without || with.0 == "classify", "{with:?} and {without:?}");
+        }
+        for (name, other) in off(pipeline) {
+            assert!(Cost::of(&with(pipeline, &[DERIVED, other])).is_within(&derived), "{name}");
+        }
+    }
+    for (pipeline, index, name) in [
+        (Pipeline::Footprint, 0, "gbuffer_copy"),
+        (Pipeline::Published, 0, "gbuffer_copy"),
+        (Pipeline::Footprint, 1, "packed_guide"),
+    ] {
+        let error = Plan::new(&with(pipeline, &[DERIVED, READ_INSTEAD[index].1]), SIZE).unwrap_err();
+        assert!(matches!(error, Error::Features { .. }) && error.to_string().contains(name), "{error}");
     }
 }
 

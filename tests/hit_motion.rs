@@ -2,51 +2,14 @@
 
 use std::cell::Cell;
 
-use glam::{DMat4, DQuat, DVec2, DVec3, UVec2};
-use limpid::{FrameInputs, Settings};
+use glam::{DVec2, DVec3, UVec2};
+use limpid::Settings;
+use limpid_harness::eye::{Eye, any_turn, any_vector};
 use limpid_harness::strategy::{Spec, any_spec, noise};
 use limpid_harness::{Case, Change, Executor, Images, Pixel, Snapshot, Step, for_all};
 use proptest::prelude::*;
 
 const SIZE: UVec2 = UVec2::new(64, 40);
-
-/// A camera of the harness that was turned and moved, in 64 bits.
-#[derive(Debug, Clone, Copy)]
-struct Eye {
-    position: DVec3,
-    rotation: DQuat,
-}
-
-impl Eye {
-    fn frame(&self) -> FrameInputs {
-        let mut camera = Case::camera(SIZE);
-        let world_to_view = DMat4::from_quat(self.rotation.inverse()) * DMat4::from_translation(-self.position);
-        camera.world_to_view = world_to_view.as_mat4();
-        FrameInputs::new(camera, SIZE)
-    }
-
-    fn projection() -> DMat4 {
-        Case::camera(SIZE).view_to_clip.as_dmat4()
-    }
-
-    /// Direction through the centre of a pixel.
-    fn direction(&self, pixel: UVec2) -> DVec3 {
-        let uv = (pixel.as_dvec2() + 0.5) / SIZE.as_dvec2();
-        let ndc = DVec3::new(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, 0.5);
-        self.rotation * Self::projection().inverse().project_point3(ndc).normalize()
-    }
-
-    /// Where a point is on screen, in pixels, unless it is behind the camera.
-    fn place(&self, point: DVec3) -> Option<DVec2> {
-        let view = self.rotation.inverse() * (point - self.position);
-        let ndc = Self::projection().project_point3(view);
-        (view.z < -0.1).then(|| DVec2::new(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y) * SIZE.as_dvec2())
-    }
-
-    fn depth(&self, point: DVec3) -> f64 {
-        -(self.rotation.inverse() * (point - self.position)).z
-    }
-}
 
 /// A flat mirror without end.
 #[derive(Debug, Clone, Copy)]
@@ -58,7 +21,7 @@ struct Mirror {
 impl Mirror {
     /// Where a pixel shows it; `None` beyond its horizon and far away.
     fn seen(&self, eye: &Eye, pixel: UVec2) -> Option<DVec3> {
-        let direction = eye.direction(pixel);
+        let (_, direction) = eye.ray(pixel);
         let t = self.normal.dot(self.point - eye.position) / self.normal.dot(direction);
         (0.2..50.0).contains(&t).then(|| eye.position + direction * t)
     }
@@ -68,18 +31,13 @@ impl Mirror {
     }
 }
 
-fn any_vector(reach: f64) -> impl Strategy<Value = DVec3> {
-    prop::array::uniform3(-reach..reach).prop_map(DVec3::from)
-}
-
 /// A mirror before two cameras that are near to each other.
 fn any_view() -> impl Strategy<Value = (Mirror, [Eye; 2])> {
-    let turn = |reach| any_vector(reach).prop_map(DQuat::from_scaled_axis);
-    let eyes = (any_vector(20.0), turn(3.0), any_vector(0.1), turn(0.03));
-    (eyes, 1.0f64..8.0, turn(0.9)).prop_map(|((position, rotation, step, turn), distance, tilt)| {
+    let eyes = (any_vector(20.0), any_turn(3.0), any_vector(0.1), any_turn(0.03));
+    (eyes, 1.0f64..8.0, any_turn(0.9)).prop_map(|((position, rotation, step, turn), distance, tilt)| {
         let mirror = Mirror { point: position - rotation * DVec3::Z * distance, normal: rotation * tilt * DVec3::Z };
-        let before = Eye { position: position + step, rotation: turn * rotation };
-        (mirror, [before, Eye { position, rotation }])
+        let before = Eye::new(position + step, turn * rotation, SIZE);
+        (mirror, [before, Eye::new(position, rotation, SIZE)])
     })
 }
 
@@ -134,7 +92,7 @@ fn history_of_a_flat_mirror_is_found_where_the_moved_thing_was_reflected() {
                 for x in 0..SIZE.x {
                     let pixel = UVec2::new(x, y);
                     let Some(seen) = mirror.seen(&eyes[1], pixel) else { continue };
-                    let along = eyes[1].direction(pixel);
+                    let (_, along) = eyes[1].ray(pixel);
                     let reflected = along - mirror.normal * (2.0 * along.dot(mirror.normal));
                     let hit = seen + reflected * as_half(hit_share * seen.distance(eyes[1].position));
                     let Some(place) = eyes[0].place(mirror.image(hit - moved(pixel))) else { continue };

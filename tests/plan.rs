@@ -72,6 +72,7 @@ proptest! {
         prop_assert_eq!(plan.inputs().any(|i| i == "motion"), features.surface_motion);
         let is_published = settings.pipeline == Pipeline::Published;
         let has_input = |name: &str| plan.inputs().any(|input| input == name);
+        prop_assert_eq!(has_input("normal"), features.normal_input);
         prop_assert_eq!(has_input("prev_normal"), !features.gbuffer_copy);
         prop_assert_eq!(has_input("prev_depth"), !features.gbuffer_copy);
         let reads_prev_roughness = !features.gbuffer_copy && features.constant_roughness.is_none();

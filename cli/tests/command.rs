@@ -208,6 +208,23 @@ fn hit_motion_is_used_where_there_is_some_and_asked_for_where_there_is_none() {
 }
 
 #[test]
+fn normals_are_asked_for_unless_they_are_derived() {
+    let folder = Folder::new("normals");
+    let (demonstration, without) = (folder.join("demo"), folder.join("without"));
+    demo(path(&demonstration), &["--backend", "cpu"]);
+    let sequence = Sequence::open(&demonstration.join("noisy"), &ChannelNames::default()).unwrap();
+    let frame = sequence.load(1).unwrap();
+    let frame = limpid_cli::sequence::Frame { normal: vec![[0.0; 3]; frame.pixels()], ..frame };
+    limpid_cli::sequence::write_sequence(&without, "without", 1.0, [frame]).unwrap();
+    for backend in ["cpu", "auto"] {
+        let out = folder.join(backend);
+        let arguments = ["denoise", path(&without), "--out", path(&out), "--backend", backend];
+        fails(&arguments, 1, &["frame_0001.exr", "normal.X", "--channel", "--features=-normal_input"]);
+        succeeds(&[&arguments[..], &["--features=-normal_input"]].concat());
+    }
+}
+
+#[test]
 fn fewer_rays_cost_error() {
     let folder = Folder::new("rays");
     let mut psnr = Vec::new();

@@ -32,6 +32,8 @@ pub struct PrevGbuffer {
 
 /// The caller's images of one frame. Encodings are set in
 /// [`Settings::conventions`](limpid::settings::Conventions). The same view may serve several inputs.
+///
+/// What the settings leave out, such as `normal` without the feature `normal_input`, is not looked at: anything will do there.
 #[derive(Debug, Clone, Copy)]
 pub struct Inputs {
     /// `rgb`: noisy radiance, `a`: hit distance.

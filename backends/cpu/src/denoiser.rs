@@ -24,6 +24,8 @@ pub struct PrevGbuffer<'a> {
 
 /// The caller's images of one frame, of any format. Encodings are set in
 /// [`Settings::conventions`](limpid::settings::Conventions).
+///
+/// What the settings leave out, such as `normal` without the feature `normal_input`, is not looked at: anything will do there.
 #[derive(Debug, Clone, Copy)]
 pub struct Inputs<'a> {
     /// `rgb`: noisy radiance, `a`: hit distance.

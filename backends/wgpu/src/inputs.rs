@@ -21,6 +21,8 @@ pub struct PrevGbuffer<'a> {
 /// read as float will do. The same view may serve several inputs.
 ///
 /// Views must show one mip level, and the depth aspect alone of formats that have a stencil.
+///
+/// What the settings leave out, such as `normal` without the feature `normal_input`, is not looked at: anything will do there.
 #[derive(Debug, Clone, Copy)]
 pub struct Inputs<'a> {
     /// `rgb`: noisy radiance, `a`: hit distance.

@@ -1,5 +1,6 @@
 //! What a user should know and do.
 
+use limpid::Settings;
 use limpid::settings::{Conventions, NdcY};
 use serde_json::json;
 
@@ -17,15 +18,25 @@ pub(super) fn findings(
     content: &Content,
     geometry: &Geometry,
     motion: &Motion,
-    conventions: &Conventions,
+    given: &Settings,
     exposure: f32,
 ) -> Vec<Finding> {
     let mut all = Vec::new();
     all.extend(geometry_findings(geometry));
-    all.extend(motion_findings(motion, conventions));
+    all.extend(motion_findings(motion, &given.conventions));
     all.extend(value_findings(content, exposure));
+    if lacks_normals(content, given) {
+        let advice =
+            "write normal.X, .Y and .Z, or leave the feature normal_input out, with which they are derived from depth";
+        all.push(finding(Severity::Error, "there are no normals", advice));
+    }
     all.extend(cost_findings(content));
     all
+}
+
+/// Whether normals are to be read and there are none.
+fn lacks_normals(content: &Content, given: &Settings) -> bool {
+    given.features.normal_input && content.normals_zero >= 1.0
 }
 
 fn geometry_findings(geometry: &Geometry) -> Vec<Finding> {
@@ -171,11 +182,11 @@ fn value_findings(content: &Content, exposure: f32) -> Vec<Finding> {
             "they are contained at their pixel, which counts as black or as sky; find their cause",
         ));
     }
-    if content.normals_zero > 0.0 {
+    if content.normals_zero > 0.0 && content.normals_zero < 1.0 {
         let found = format!("{} of surfaces have a normal of length 0", percent(content.normals_zero));
         all.push(finding(Warning, found, "such pixels count as sky"));
     }
-    if content.normals_not_unit > 0.02 {
+    if content.normals_not_unit > 0.02 && content.normals_zero < 1.0 {
         let found = format!("{} of normals are not of unit length", percent(content.normals_not_unit));
         all.push(finding(Note, found, "they are normalised; check that they are not filtered or of another encoding"));
     }
@@ -241,25 +252,29 @@ pub(super) fn transposed(which: Transposed) -> Vec<Finding> {
     all.map(|(_, name)| finding(Severity::Error, format!("the {name} matrices are transposed"), advice)).collect()
 }
 
-/// Conventions that mend what was found.
-pub(super) fn conventions(geometry: &Geometry, motion: &Motion, given: &Conventions) -> Vec<Change> {
+/// Settings that mend what was found.
+pub(super) fn mends(content: &Content, geometry: &Geometry, motion: &Motion, given: &Settings) -> Vec<Change> {
     let mut changes = Vec::new();
     let mut mend = |setting: &str, value, because: &str| {
         changes.push(Change::new(&format!("conventions.{setting}"), value, because, "the data is encoded so"));
     };
+    let conventions = &given.conventions;
     if motion.best_factor != glam::Vec2::ONE {
-        let scale = motion.best_factor * given.motion_scale;
+        let scale = motion.best_factor * conventions.motion_scale;
         mend("motion_scale", json!([number(scale.x), number(scale.y)]), "then they lead to the same surface");
     }
-    if motion.includes_jitter && !given.motion_includes_jitter {
+    if motion.includes_jitter && !conventions.motion_includes_jitter {
         mend("motion_includes_jitter", json!(true), "motion vectors contain the camera's jitter");
     }
     if geometry.best.normal == NormalMeaning::WorldUnsigned {
         mend("normal", json!("unsigned"), "then normals are those of the surface");
     }
     if geometry.y_down {
-        let other = if given.ndc_y == NdcY::Up { "down" } else { "up" };
+        let other = if conventions.ndc_y == NdcY::Up { "down" } else { "up" };
         mend("ndc_y", json!(other), "then normals are those of the surface");
+    }
+    if lacks_normals(content, given) {
+        changes.push(Change::off("normal_input", "there are no normals", "depth is as precise as 32 bits are"));
     }
     changes
 }

@@ -192,7 +192,10 @@ impl Gatherer {
             let at = |dx: u32, dy: u32| ((pixel.y + dy) * size.x + pixel.x + dx) as usize;
             let depths = [at(0, 0), at(1, 0), at(0, 1)].map(|i| frame.depth[i]);
             let stored = Vec3::from(frame.normal[at(0, 0)]);
-            if depths.iter().any(|depth| !(depth.is_finite() && *depth > 0.0)) || !stored.is_finite() {
+            if depths.iter().any(|depth| !(depth.is_finite() && *depth > 0.0))
+                || !stored.is_finite()
+                || stored == Vec3::ZERO
+            {
                 continue;
             }
             self.samples += 1;

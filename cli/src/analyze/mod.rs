@@ -158,12 +158,12 @@ impl Analyzer {
         let needs = self.needs.finish();
         let given = self.settings;
         let mut findings = advice::transposed(self.transposed);
-        findings.extend(advice::findings(&content, &geometry, &motion, &given.conventions, self.exposure));
+        findings.extend(advice::findings(&content, &geometry, &motion, &given, self.exposure));
         findings.sort_by_key(|finding| finding.severity);
         // What a sequence needs cannot be told from data that means something else.
         let is_wrong = findings.iter().any(|finding| finding.severity == Severity::Error);
         let changes = match is_wrong {
-            true => advice::conventions(&geometry, &motion, &given.conventions),
+            true => advice::mends(&content, &geometry, &motion, &given),
             false => recommend::smallest(&content, &needs, &given),
         };
         let recommended = apply(&given, &changes)?;

@@ -145,8 +145,9 @@ fn mismatch(previous: &Frame, frame: &Frame, inverse_projections: [&Mat4; 2], pi
     if !(previous.depth[j].is_finite() && previous.depth[j] > 0.0) {
         return 1.0;
     }
-    let cosine =
-        Vec3::from(frame.normal[i]).normalize_or_zero().dot(Vec3::from(previous.normal[j]).normalize_or_zero());
+    let normals = [frame.normal[i], previous.normal[j]].map(|normal| Vec3::from(normal).normalize_or_zero());
+    // Those that are not there say nothing.
+    let cosine = if normals.contains(&Vec3::ZERO) { 1.0 } else { normals[0].dot(normals[1]) };
     let roughness = (frame.roughness[i] - previous.roughness[j]).abs();
     let here = world_position(frame, inverse_projections[0], pixel);
     let there = world_position(previous, inverse_projections[1], place);

@@ -32,7 +32,7 @@ impl Change {
         Self { setting: setting.to_owned(), value, because, holds_while }
     }
 
-    fn off(feature: &str, because: impl Into<String>, holds_while: &str) -> Self {
+    pub(super) fn off(feature: &str, because: impl Into<String>, holds_while: &str) -> Self {
         Self::new(&format!("features.{feature}"), Value::Bool(false), because, holds_while)
     }
 }

@@ -121,6 +121,14 @@ fn values_that_mean_nothing_are_counted() {
     assert!(["NaN", "negative", "not within 0 and 1", "length 0"].iter().all(|part| text.contains(part)), "{text}");
 }
 
+#[test]
+fn normals_that_are_not_there_are_left_out() {
+    let without = analysis("gallery", |frame| frame.normal.fill([0.0; 3]));
+    assert_eq!(errors(&without), ["there are no normals"], "{without}");
+    assert!(!without.to_string().contains("of length 0") && !without.to_string().contains("not of unit length"));
+    assert!(without.settings.contains("normal_input = false"), "{}", without.settings);
+}
+
 /// Frames of a scene in which every surface is a perfect mirror, and nothing moves.
 fn mirrors_at_rest(count: u32, traced: bool) -> Vec<Frame> {
     let scene = scene::by_name("still").unwrap();

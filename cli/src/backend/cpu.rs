@@ -88,7 +88,8 @@ impl Backend for Cpu {
         frame_inputs.reset = frame.reset;
         frame_inputs.frame_seconds = frame.seconds;
         frame_inputs.exposure = exposure;
-        let normal = texture(TexelFormat::Rgba32Float, size, frame.normal.iter().flat_map(|&[x, y, z]| [x, y, z, 0.0]));
+        let normals = super::normals(self.plan(), frame)?;
+        let normal = texture(TexelFormat::Rgba32Float, size, normals.into_iter().flatten());
         let roughness = texture(TexelFormat::R32Float, size, frame.roughness.iter().copied());
         let depth = texture(TexelFormat::R32Float, size, frame.depth.iter().copied());
         let motion = texture(TexelFormat::Rg32Float, size, frame.motion.iter().flatten().copied());

@@ -165,7 +165,7 @@ impl Gpu {
     }
 
     fn upload_gbuffer(&self, frame: &Frame) -> Result<()> {
-        let normals: Vec<[f32; 4]> = frame.normal.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect();
+        let normals = super::normals(self.denoiser.plan(), frame)?;
         self.upload(&self.images.gbuffer.normal, frame.size, &normals);
         self.upload(&self.images.gbuffer.roughness, frame.size, &frame.roughness);
         self.upload(&self.images.gbuffer.depth, frame.size, &frame.depth);

@@ -6,7 +6,7 @@ mod vulkan;
 
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::ValueEnum;
 use cpu_time::ProcessTime;
 use glam::UVec2;
@@ -56,6 +56,17 @@ pub trait Backend {
     ///
     /// For frames that the library refuses and for a device that fails.
     fn denoise(&mut self, frame: &Frame, exposure: f32, tracer: Option<Tracer<'_>>) -> Result<Denoised>;
+}
+
+/// Normals in four channels.
+fn normals(plan: &Plan, frame: &Frame) -> Result<Vec<[f32; 4]>> {
+    let are_there = !plan.inputs().any(|input| input == "normal") || frame.has_normals() || !frame.has_surfaces();
+    ensure!(
+        are_there,
+        "there are no normals, which the feature normal_input reads: expected channels normal.X, .Y and .Z, or other ones \
+         named with --channel normal=NAME, or --features=-normal_input, with which they are derived from depth"
+    );
+    Ok(frame.normal.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect())
 }
 
 /// The motion of what was hit, in four channels, where a plan wants it.

@@ -80,7 +80,7 @@ impl Backend for Vulkan {
         frame_inputs.frame_seconds = frame.seconds;
         frame_inputs.exposure = exposure;
         let (session, context) = (&mut self.session, &self.context);
-        let normals: Vec<[f32; 4]> = frame.normal.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect();
+        let normals = super::normals(session.denoiser().plan(), frame)?;
         let normal = upload(context, Format::R32G32B32A32_SFLOAT, size, &normals)?;
         let roughness = upload(context, Format::R32_SFLOAT, size, &frame.roughness)?;
         let depth = upload(context, Format::R32_SFLOAT, size, &frame.depth)?;

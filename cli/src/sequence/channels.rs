@@ -9,7 +9,8 @@ pub struct ChannelNames {
     pub radiance: [String; 3],
     /// Length of the reflection ray: `reflection.A`.
     pub hit_distance: String,
-    /// World-space normal: `normal.X`, `.Y`, `.Z`.
+    /// World-space normal: `normal.X`, `.Y`, `.Z`. Frames may lack all three as long as the names are the default ones:
+    /// normals are 0 then.
     pub normal: [String; 3],
     /// Perceptual roughness: `roughness`.
     pub roughness: String,

@@ -23,7 +23,7 @@ pub struct Frame {
     /// Linear radiance along one reflection ray (rgb) and that ray's world-space length to its hit
     /// (a): 10000 where it left the scene, 0 where it fell below the surface or the pixel is sky.
     pub radiance: Vec<[f32; 4]>,
-    /// World-space unit shading normal, 0 at sky.
+    /// World-space unit shading normal, 0 at sky, and everywhere where there are none.
     pub normal: Vec<[f32; 3]>,
     /// Perceptual roughness, 0 to 1; GGX alpha is its square.
     pub roughness: Vec<f32>,
@@ -43,6 +43,16 @@ impl Frame {
     /// The number of pixels.
     pub fn pixels(&self) -> usize {
         self.size.x as usize * self.size.y as usize
+    }
+
+    /// Whether any pixel has a normal.
+    pub fn has_normals(&self) -> bool {
+        self.normal.iter().any(|normal| *normal != [0.0; 3])
+    }
+
+    /// Whether any pixel shows a surface.
+    pub fn has_surfaces(&self) -> bool {
+        self.depth.iter().any(|depth| *depth > 0.0)
     }
 
     /// What is wrong with the frame's values.

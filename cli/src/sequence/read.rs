@@ -79,7 +79,6 @@ impl Sequence {
         };
         want("radiance", &names.radiance)?;
         want("hit_distance", slice::from_ref(&names.hit_distance))?;
-        want("normal", &names.normal)?;
         want("roughness", slice::from_ref(&names.roughness))?;
         want("depth", slice::from_ref(&names.depth))?;
         want("motion", &names.motion)?;
@@ -88,14 +87,16 @@ impl Sequence {
             let is_wanted = names != default || names.iter().any(|name| file.find(name).is_some());
             if is_wanted { want(key, names).map(|()| true) } else { Ok(false) }
         };
+        let has_normals = want_if_there("normal", &names.normal, &default.normal)?;
         let has_hit_motion = want_if_there("hit_motion", &names.hit_motion, &default.hit_motion)?;
         want_if_there("reference", &names.reference, &default.reference)?;
 
         let size = self.size();
         let planes = file.read(&wanted, size)?;
-        let [r, g, b, a, x, y, z, roughness, depth, u, v, rest @ ..] = &planes[..] else {
+        let [r, g, b, a, roughness, depth, u, v, rest @ ..] = &planes[..] else {
             unreachable!("there is one plane for each channel");
         };
+        let (normals, rest) = rest.split_at(if has_normals { 3 } else { 0 });
         let (moved, truth) = rest.split_at(if has_hit_motion { 3 } else { 0 });
         let vectors = |planes: &[Vec<f32>]| match planes {
             [x, y, z] => Some(interleave([x, y, z])),
@@ -108,7 +109,7 @@ impl Sequence {
             seconds: entry.seconds,
             camera: entry.camera,
             radiance: interleave([r, g, b, a]),
-            normal: interleave([x, y, z]),
+            normal: vectors(normals).unwrap_or_else(|| vec![[0.0; 3]; r.len()]),
             roughness: roughness.clone(),
             depth: depth.clone(),
             motion: interleave([u, v]),

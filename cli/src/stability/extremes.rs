@@ -166,7 +166,11 @@ pub(super) fn normals() -> Vec<Case> {
     };
     let grazing = |angle: f32| [angle.cos(), 0.0, angle.sin()];
     vec![
-        uniform("zero", [0.0; 3]),
+        Case::new(GROUP, "zero beside one that is not", |frame, p| {
+            let normal = if p == UVec2::ZERO { [0.0, 0.0, 1.0] } else { [0.0; 3] };
+            Pixel { normal, ..calm(frame, p) }
+        })
+        .lasting(12),
         uniform("NaN", [f32::NAN; 3]),
         uniform("infinite", [f32::INFINITY, 0.0, 0.0]),
         uniform("1e-20 long", [0.0, 0.0, 1e-20]),

@@ -6,6 +6,7 @@
 mod agreement;
 mod case;
 pub mod executor;
+pub mod eye;
 mod snapshot;
 pub mod strategy;
 
