@@ -13,7 +13,8 @@
 //! in   tiles, args   lists                tiles to denoise
 //! out  history       rgba16float  full    accumulated radiance, its length, noise and hit share
 //!
-//! Grid: one 8x8 workgroup per listed tile (indirect). Loads 4 blocks, 8 guides, 8 histories, 9 radiances at most.
+//! Grid: one 8x8 workgroup per listed tile (indirect). Loads 4 blocks, 8 guides, 8 histories (one history: 4 and 4), 9
+//! radiances at most.
 //! After: accumulation as in Schied et al. 2017 (SVGF); reflected points after Lagarde and de Rousiers 2014 (dominant
 //! direction of the lobe). The two candidates are mixed by how well each fits the blocks of this frame; how far they
 //! lie apart, against the footprint, bounds what history is worth.
@@ -33,6 +34,8 @@ import package::shared::light;
 override MIRROR_PARALLAX: bool = true;
 // Looks for history where the surface was.
 override SURFACE_MOTION: bool = true;
+// Looks in both places for each pixel.
+override BOTH_HISTORIES: bool = true;
 // Moves the reflected point back to where it was.
 override HIT_MOTION: bool = false;
 // Clips history of smooth surfaces to what the neighbourhood makes plausible.
@@ -63,6 +66,8 @@ const FIT: f32 = 0.2;
 const SURFACE_FROM: f32 = 0.05;
 const SURFACE_TO: f32 = 0.4;
 const REFLECTION_UP_TO: f32 = 0.6;
+// Roughness from which, of the two, history is looked for where the surface was.
+const ONE_BY_SURFACE_FROM: f32 = 0.1;
 // A sample so many times as bright as its surroundings has hit what few rays hit: that its hit distance is another
 // than history's is no reason to forget history.
 const RARE: f32 = 2.0;
@@ -166,14 +171,17 @@ fn load_prev_guide(texel: vec2<i32>) -> Guide {
     return decode_prev_guide(texel);
 }
 
-// Blends those of four texels that show the surface. The plane test is done in world space, so that a camera that
-// moves forward does not fail it.
+// Blends those of four texels that show the surface. The plane test is done with last frame's depths where that camera
+// saw them, so that a camera that moves forward does not fail it.
 fn history_at(prev_uv: vec2<f32>, guide: Guide, position: vec3<f32>, share: f32, tolerance: Tolerance) -> Found {
     let size = vec2<f32>(frame.prev_size);
     let place = prev_uv * size;
     if !(all(place > vec2<f32>(0.0)) && all(place < size)) {
         return nothing_found();
     }
+    // Distance from the plane of the surface of a place in last frame's pixels.
+    let offset_of_plane = vec4<f32>(0.0, 0.0, 0.0, dot(guide.normal, position));
+    let plane = vec4<f32>(guide.normal, 0.0) * frame.world_from_prev_pixel - offset_of_plane;
     let base = floor(place - 0.5);
     // In steps: of a still image the rest is rounding, which would leak light from lamps.
     let fraction = round((place - 0.5 - base) * 256.0) * (1.0 / 256.0);
@@ -186,7 +194,8 @@ fn history_at(prev_uv: vec2<f32>, guide: Guide, position: vec3<f32>, share: f32,
         let texel = clamp(vec2<i32>(base) + vec2<i32>(offset), vec2<i32>(0), last);
         let tap = load_prev_guide(texel);
         let history = unpack_history(textureLoad(in_history, texel, 0));
-        let from_plane = dot(guide.normal, prev_world_position(texel, tap.depth) - position);
+        let w_of_tap = frame.prev_clip_w.x + frame.prev_clip_w.y * tap.depth;
+        let from_plane = dot(plane, vec4<f32>((vec2<f32>(texel) + 0.5) * w_of_tap, tap.depth, 1.0));
         let is_same = tap.denoised
             && abs(from_plane) < tolerance.plane * guide.depth
             && dot(tap.normal, guide.normal) > tolerance.cosine
@@ -301,11 +310,14 @@ fn candidates_of(pixel: vec2<u32>, subject: Subject) -> Candidates {
     var found = Candidates(static_uv, nothing_found(), vec2<f32>(-1.0), nothing_found());
     // Where it is not where the camera's motion alone would put it, something else moved the surface.
     var moves = false;
+    var by_surface: Tolerance;
     if SURFACE_MOTION {
         found.surface_uv = surface_prev_uv(pixel);
         moves = length((found.surface_uv - static_uv) * vec2<f32>(frame.size)) > 0.5;
-        let tolerance = Tolerance(select(0.01, 0.1, moves), select(0.9, 0.7, moves), share_tolerance);
-        found.surface = history_at(found.surface_uv, subject.guide, subject.position, subject.share, tolerance);
+        by_surface = Tolerance(select(0.01, 0.1, moves), select(0.9, 0.7, moves), share_tolerance);
+        if BOTH_HISTORIES || !MIRROR_PARALLAX {
+            found.surface = history_at(found.surface_uv, subject.guide, subject.position, subject.share, by_surface);
+        }
     }
     if MIRROR_PARALLAX {
         let alpha = alpha_of(r);
@@ -318,8 +330,19 @@ fn candidates_of(pixel: vec2<u32>, subject: Subject) -> Candidates {
         if HIT_MOTION {
             found.reflection_uv = prev_uv_of(image - image_motion(pixel, subject.guide.normal, dominant)) + surface_moved;
         }
-        let tolerance = Tolerance(select(0.015, 0.1, moves), select(0.98, 0.95, r >= 0.3), share_tolerance);
-        found.reflection = history_at(found.reflection_uv, subject.guide, subject.position, subject.share, tolerance);
+        var place = found.reflection_uv;
+        var tolerance = Tolerance(select(0.015, 0.1, moves), select(0.98, 0.95, r >= 0.3), share_tolerance);
+        let is_by_surface = SURFACE_MOTION && !BOTH_HISTORIES && r >= ONE_BY_SURFACE_FROM;
+        if is_by_surface {
+            place = found.surface_uv;
+            tolerance = by_surface;
+        }
+        let history = history_at(place, subject.guide, subject.position, subject.share, tolerance);
+        if is_by_surface {
+            found.surface = history;
+        } else {
+            found.reflection = history;
+        }
     }
     return found;
 }
@@ -341,16 +364,18 @@ fn chosen(candidates: Candidates, subject: Subject) -> Found {
         let reflection = candidates.reflection;
         let apart = max(length((candidates.reflection_uv - candidates.surface_uv) * vec2<f32>(frame.size)), 1e-3);
         let radius = lobe_footprint(subject.position, subject.guide, subject.share).along;
-        if surface.is_valid {
-            if reflection.is_valid {
-                found = mix_found(surface, reflection, reflection_weight(candidates, subject));
-                cap = min(cap, 1.0 + frame.disagreement_limit * (radius + 1.0) / apart);
-            } else {
-                cap = min(cap, (radius + 0.5) / apart);
-            }
-        } else {
+        let worth = 1.0 + frame.disagreement_limit * (radius + 1.0) / apart;
+        if !surface.is_valid {
             found = reflection;
             found.is_valid = reflection.is_valid && r < REFLECTION_UP_TO;
+            cap = select(cap, min(cap, worth), SURFACE_MOTION && !BOTH_HISTORIES);
+        } else if !BOTH_HISTORIES {
+            cap = min(cap, worth);
+        } else if reflection.is_valid {
+            found = mix_found(surface, reflection, reflection_weight(candidates, subject));
+            cap = min(cap, worth);
+        } else {
+            cap = min(cap, (radius + 0.5) / apart);
         }
     }
     found.length = select(0.0, min(found.length, cap), found.is_valid);

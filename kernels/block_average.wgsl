@@ -55,23 +55,28 @@ fn choose(corner: vec2<u32>) -> Choice {
     var nearest = 1e9;
     var count = 0u;
     let size = pixel_count(corner);
-    for (var i = 0u; i < size.x * size.y; i++) {
-        let pixel = corner + vec2<u32>(i % size.x, i / size.x);
-        let guide = load_guide(pixel);
+    for (var i = 0u; i < 4u * size.y; i++) {
+        let pixel = corner + vec2<u32>(i & 3u, i >> 2u);
+        if (i & 3u) >= size.x {
+            continue;
+        }
+        let denoised = is_denoised(pixel);
         // A little off the centre, so that no two are as near.
         let offset = vec2<f32>(pixel - corner) - vec2<f32>(1.4, 1.45);
         let distance = dot(offset, offset);
-        if guide.denoised && distance < nearest {
+        if denoised && distance < nearest {
             nearest = distance;
-            choice.guide = guide;
             choice.pixel = pixel;
         }
-        count += select(0u, 1u, guide.denoised);
+        count += select(0u, 1u, denoised);
         if !ACCUMULATED {
-            let l = select(0.0, luminance(load_radiance(pixel)), guide.denoised);
+            let l = select(0.0, luminance(load_radiance(pixel)), denoised);
             let p = choice.peaks;
             choice.peaks = vec3<f32>(max(p.x, l), max(p.y, min(p.x, l)), max(p.z, min(p.y, l)));
         }
+    }
+    if count > 0u {
+        choice.guide = load_guide(choice.pixel);
     }
     // A sample on its own is above no other.
     choice.peaks.y = select(choice.peaks.y, choice.peaks.x, count < 2u);
@@ -107,8 +112,11 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
     var moments = vec2<f32>(0.0);
     var squared_weight = 0.0;
     let size = pixel_count(corner);
-    for (var i = 0u; i < size.x * size.y; i++) {
-        let pixel = corner + vec2<u32>(i % size.x, i / size.x);
+    for (var i = 0u; i < 4u * size.y; i++) {
+        let pixel = corner + vec2<u32>(i & 3u, i >> 2u);
+        if (i & 3u) >= size.x {
+            continue;
+        }
         let guide = load_guide(pixel);
         let w = select(0.0, exp(-plane_penalty(plane, guide, vec2<f32>(pixel) + 0.5)), guide.denoised);
         var c = vec3<f32>(0.0);

@@ -53,17 +53,27 @@ fn block_spread(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     // Every block within the half axes, or as many taps as there may be.
     let reach = clamp(vec2<i32>(ceil(radius)), vec2<i32>(1), vec2<i32>(WIDE_TAPS));
     let step = max(radius / f32(WIDE_TAPS), vec2<f32>(1.0));
-    let row = 2 * reach.x + 1;
+    let taps = (2 * reach.x + 1) * (2 * reach.y + 1);
+    let far = vec2<f32>(reach);
+    // Steps along and across, on screen; from there to units of the half axes.
+    let along = footprint.axis * step.x;
+    let across = side * step.y;
+    let inverse_radius = 1.0 / radius;
+    let rho_x = vec2<f32>(footprint.axis.x, side.x) * inverse_radius;
+    let rho_y = vec2<f32>(footprint.axis.y, side.y) * inverse_radius;
     // rgb: radiance or excess; a: weight.
     var sum = vec4<f32>(0.0);
-    for (var i = 0; i < row * (2 * reach.y + 1); i++) {
-        let grid = vec2<f32>(vec2<i32>(i % row, i / row) - reach);
-        let offset = round(footprint.axis * (grid.x * step.x) + side * (grid.y * step.y));
-        let at = clamp(center + vec2<i32>(offset), vec2<i32>(0), last);
+    var grid = -far;
+    for (var i = 0; i < taps; i++) {
+        let offset = round(along * grid.x + across * grid.y);
+        let is_end = grid.x >= far.x;
+        grid = vec2<f32>(select(grid.x + 1.0, -far.x, is_end), select(grid.y, grid.y + 1.0, is_end));
+        let wanted = center + vec2<i32>(offset);
+        let at = clamp(wanted, vec2<i32>(0), last);
         let tap = unpack_block(textureLoad(in_blocks, at, 0));
-        let rho = vec2<f32>(dot(offset, footprint.axis), dot(offset, side)) / radius;
+        let rho = offset.x * rho_x + offset.y * rho_y;
         let penalty = plane_penalty(plane, tap.guide, block_place(at)) + 1.2 * dot(rho, rho);
-        let fits = tap.guide.denoised && all(at == center + vec2<i32>(offset));
+        let fits = tap.guide.denoised && all(at == wanted);
         if ACCUMULATED {
             let apart = (tap.share - block.share) * (1.0 / SHARE_TOLERANCE);
             sum += vec4<f32>(tap.radiance, 1.0) * select(0.0, exp(-penalty - apart * apart), fits);

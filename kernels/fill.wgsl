@@ -5,8 +5,8 @@
 //! in   radiance   any float     full   input fallback only
 //! out  output     rgba16float   full   rgb: fallback radiance; a: 0
 //! out  prev_guide r32uint       full   0 in new tiles (footprint pipeline, G-buffer copy)
-//! out  guide      rg32uint      full   the same, unless it is complete: where a tile is not new, the history there, which was
-//!                                      the output a frame ago, has no length
+//! out  guide      rg32uint      full   the same, unless it is complete: in other tiles the history, which was the output
+//!                                      a frame ago, has no length
 //!
 //! Grid: one 8x8 workgroup per 16 tiles of the list (indirect), an invocation handles a pixel of each. Touches that only.
 

@@ -107,7 +107,10 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let glint = GLINT_LIMIT * luminance(own_radiance);
     let own_brightness = brightness(own_radiance);
     let reach = clamp(radius, vec2<f32>(NEAR_LEAST), vec2<f32>(NEAR_MOST)) * inverseSqrt(max(f32(NEAR_TAPS), 1.0));
+    // From pixels to half axes.
     let falloff = 1.0 / max(radius, vec2<f32>(NEAR_LEAST));
+    let rho_x = vec2<f32>(footprint.axis.x, side.x) * falloff;
+    let rho_y = vec2<f32>(footprint.axis.y, side.y) * falloff;
     var direction = vec2<f32>(1.0, 0.0);
     let by_blocks = smoothstep(WIDE_FROM, WIDE_TO, radius.x) * smoothstep(0.0, 0.3, wide.fit);
     // Where blocks decide alone, taps would count for nothing.
@@ -127,8 +130,8 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
         let history = unpack_history(textureLoad(in_history, texel, 0));
         let radiance = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
         let l = luminance(radiance);
-        let kept = blend(radiance, radiance * min(1.0, glint / l), sharp);
-        let rho = vec2<f32>(dot(offset, footprint.axis), dot(offset, side)) * falloff;
+        let kept = radiance * (1.0 - sharp + sharp * min(1.0, glint / l));
+        let rho = offset.x * rho_x + offset.y * rho_y;
         let apart = (history.share - own.share) * (1.0 / SHARE_TOLERANCE);
         let brighter = brightness(radiance) - own_brightness;
         let penalty = plane_penalty(plane, tap, vec2<f32>(texel) + 0.5) + dot(rho, rho) + apart * apart

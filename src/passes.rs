@@ -273,6 +273,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         overrides: &[
             "MIRROR_PARALLAX",
             "SURFACE_MOTION",
+            "BOTH_HISTORIES",
             "HIT_MOTION",
             "HISTORY_CLIP",
             "LIGHT_CHANGE",
@@ -300,7 +301,15 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         is_needed: has_debug_view,
         stage: Stage::Denoise,
         grid: GridTemplate::Tiles(1),
-        overrides: &["VIEW", "MIRROR_PARALLAX", "SURFACE_MOTION", "HIT_MOTION", "OUTLIER_SPREAD", "BLOCK_STATISTICS"],
+        overrides: &[
+            "VIEW",
+            "MIRROR_PARALLAX",
+            "SURFACE_MOTION",
+            "BOTH_HISTORIES",
+            "HIT_MOTION",
+            "OUTLIER_SPREAD",
+            "BLOCK_STATISTICS",
+        ],
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_motion", "motion", Current),
@@ -494,6 +503,7 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         "AVERAGE_IS_READ" => f64::from(features.history_clip || features.average_mixing),
         "MIRROR_PARALLAX" => f64::from(features.mirror_parallax),
         "SURFACE_MOTION" => f64::from(features.surface_motion),
+        "BOTH_HISTORIES" => f64::from(features.mirror_parallax && features.surface_motion && features.both_histories),
         "HIT_MOTION" => f64::from(features.hit_motion),
         "HISTORY_SEARCH" => f64::from(features.history_search),
         "EDGE_REPAIR" => f64::from(features.edge_repair),

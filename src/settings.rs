@@ -12,7 +12,7 @@ use crate::{DebugView, Error};
 pub enum Preset {
     /// The recommendation, for surfaces of every roughness.
     Default,
-    /// The same with fewer taps, for tight budgets.
+    /// The same with fewer taps and one history, for tight budgets.
     Fast,
     /// The pipeline that AMD published in 2021, with the constants it was published with, for a ray a pixel.
     Reference,
@@ -31,6 +31,7 @@ impl Preset {
                 let mut settings = Settings::default();
                 settings.features.near_taps = 4;
                 settings.features.wide_taps = 2;
+                settings.features.both_histories = false;
                 settings
             }
             Preset::Reference => {
@@ -258,6 +259,10 @@ pub struct Features {
     /// Looks for history where the surface was. For rough and curved surfaces and moving objects. Without it there
     /// is no `motion` input, and no comparison with the neighbourhood's colour.
     pub surface_motion: bool,
+    /// Footprint pipeline, with `mirror_parallax` and `surface_motion`: looks for history in both places, and mixes what it
+    /// finds by how well it fits. Without it one of them has to do: where the reflected point was for smooth surfaces,
+    /// where the surface was for others.
+    pub both_histories: bool,
     /// Published pipeline: looks at the 3x3 places around history that does not fit well.
     pub history_search: bool,
     /// Published pipeline: at edges takes those of four texels that show the same surface.
@@ -314,6 +319,7 @@ impl Default for Features {
         Self {
             mirror_parallax: true,
             surface_motion: true,
+            both_histories: true,
             history_search: true,
             edge_repair: true,
             spatial_filter: true,

@@ -38,7 +38,8 @@ fn off(pipeline: Pipeline) -> Vec<(&'static str, Change)> {
         ("edge_repair", |features| features.edge_repair = false),
         ("average_mixing", |features| features.average_mixing = false),
     ];
-    let footprint: [(&str, Change); 7] = [
+    let footprint: [(&str, Change); 8] = [
+        ("both_histories", |features| features.both_histories = false),
         ("hit_motion", |features| features.hit_motion = false),
         ("light_change", |features| features.light_change = false),
         ("outlier_spread", |features| features.outlier_spread = false),

@@ -111,8 +111,10 @@ fn derived_normal(pixel: vec2<u32>, depth: f32, encoding: DepthEncoding) -> vec3
     let w = frame.clip_w.x / depth + frame.clip_w.y;
     let away = (frame.world_from_pixel * vec4<f32>((vec2<f32>(pixel) + 0.5) * frame.clip_w.y, 1.0, 0.0)).xyz;
     let at = vec2<i32>(pixel);
-    let right = frame.world_from_pixel[0].xyz * w - away * slope_along(at, vec2<i32>(1, 0), depth, encoding);
-    let down = frame.world_from_pixel[1].xyz * w - away * slope_along(at, vec2<i32>(0, 1), depth, encoding);
+    let beside = (frame.world_from_pixel * vec4<f32>(w, 0.0, 0.0, 0.0)).xyz;
+    let below = (frame.world_from_pixel * vec4<f32>(0.0, w, 0.0, 0.0)).xyz;
+    let right = beside - away * slope_along(at, vec2<i32>(1, 0), depth, encoding);
+    let down = below - away * slope_along(at, vec2<i32>(0, 1), depth, encoding);
     let normal = cross(normalize(right), normalize(down));
     let facing = select(-normal, normal, dot(normal, toward) > 0.0);
     let squared_length = dot(normal, normal);

@@ -67,12 +67,6 @@ fn unpack_prev_guide(word: u32) -> Guide {
     return guide;
 }
 
-// Position relative to this frame's camera of what a texel of last frame showed.
-fn prev_world_position(texel: vec2<i32>, depth: f32) -> vec3<f32> {
-    let w = frame.prev_clip_w.x + frame.prev_clip_w.y * depth;
-    return (frame.world_from_prev_pixel * vec4<f32>((vec2<f32>(texel) + 0.5) * w, depth, 1.0)).xyz;
-}
-
 // Where last frame showed a position relative to this frame's camera; -1 where that lay behind its camera.
 fn prev_uv_of(position: vec3<f32>) -> vec2<f32> {
     let projected = frame.prev_uv_from_world * vec4<f32>(position, 1.0);

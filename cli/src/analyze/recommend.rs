@@ -245,7 +245,8 @@ fn published(needs: &Needs, settings: &Settings) -> Vec<Change> {
 /// What else could be left out of settings: whether a sequence misses it can only be measured. Of several values of one
 /// setting the leanest comes first.
 pub fn untried(settings: &Settings, recommended: &[Change]) -> Vec<Change> {
-    const FEATURES: [&str; 9] = [
+    const FEATURES: [&str; 10] = [
+        "both_histories",
         "spatial_filter",
         "wide_filter",
         "outlier_spread",
