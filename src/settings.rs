@@ -362,7 +362,8 @@ impl Features {
         if !self.mirror_parallax && !self.surface_motion {
             return refuse("without mirror_parallax and surface_motion there is no history to find");
         }
-        if !self.normal_input && !(self.gbuffer_copy && self.packs_guide(pipeline)) {
+        let keeps_normals = self.gbuffer_copy && self.packs_guide(pipeline);
+        if !self.normal_input && !keeps_normals {
             return refuse(
                 "without normal_input normals are found once and kept: gbuffer_copy and packed_guide have to be on",
             );
