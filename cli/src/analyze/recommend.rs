@@ -260,7 +260,10 @@ pub fn untried(settings: &Settings, recommended: &[Change]) -> Vec<Change> {
     const NEAR_TAPS: [u32; 5] = [0, 2, 4, 6, 8];
     const WIDE_TAPS: [u32; 2] = [1, 2];
     let (because, holds_while) = ("its loss stays within the bound", "scenes are like these frames");
-    let off = FEATURES.iter().map(|feature| Change::off(feature, because, holds_while));
+    // The motion of what was hit is of use only where it is reflected.
+    let is_reflected = recommended.iter().any(|change| change.setting == "features.hit_motion" && change.value == true);
+    let features = FEATURES.iter().filter(|feature| !(is_reflected && **feature == "mirror_parallax"));
+    let off = features.map(|feature| Change::off(feature, because, holds_while));
     let fewer = |path, choices: &[u32], now| {
         let fewer = choices.iter().filter(move |taps| **taps < now).map(|taps| json!(taps)).collect::<Vec<_>>();
         fewer.into_iter().map(move |taps| Change::new(path, taps, because, holds_while))

@@ -240,6 +240,13 @@ fn what_is_tried_changes_something() {
         }
     }
     assert_eq!(toml_of(&Settings::default()).unwrap(), "");
+    // The motion of what was hit is of no use without the lookup that it leads.
+    let hit_motion = Change::new("features.hit_motion", true.into(), "reflected things move", "they do");
+    let tries_parallax = |recommended: &[Change]| {
+        let tried = untried(&Settings::default(), recommended);
+        tried.iter().any(|change| change.setting == "features.mirror_parallax")
+    };
+    assert!(tries_parallax(&[]) && !tries_parallax(&[hit_motion]));
 }
 
 /// Where rough surfaces are not traced, they are left out of denoising.
