@@ -87,9 +87,6 @@ fn time_of(choice: Choice, variant: &Variant, frames: &[Frame], share: f64) -> R
     let size = frames[0].size;
     let mut backend = backend::open(choice, settings, size)?;
     let mut times = Vec::new();
-    // Frames that follow each other over and over: a sequence that begins once, not each time.
-    let mut frames = frames.to_vec();
-    frames.iter_mut().for_each(|frame| frame.reset = false);
     for round in 0..WARM_UP + TIMED {
         let denoised = backend.denoise(&frames[round % frames.len()], 1.0, None)?;
         if round >= WARM_UP {
@@ -133,7 +130,8 @@ pub fn scaling(
     stop: &dyn Fn() -> bool,
 ) -> Result<Vec<ScalingPoint>> {
     let Some(settings) = &variant.settings else { return Ok(Vec::new()) };
-    let base: Vec<Frame> = frames.iter().map(|frame| with_share(frame, 1.0)).collect();
+    // They follow each other over and over: a sequence that begins once, not each time.
+    let base: Vec<Frame> = frames.iter().map(|frame| Frame { reset: false, ..with_share(frame, 1.0) }).collect();
     let per_pixel = Plan::new(settings, SIZES[0])?.0.bytes_per_pixel() + FRAME_BYTES;
     let fitting = || available_memory().map_or(f64::INFINITY, |available| 0.8 * available / per_pixel);
     let point = |size: UVec2| {
