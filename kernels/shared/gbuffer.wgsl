@@ -47,11 +47,12 @@ struct DepthEncoding {
     sky: vec2<f32>,
 }
 
+// All conditions at once: each `&&` doubles SwiftShader's time and memory to compile (kernels/README.md).
 fn linear_depth(device: f32, encoding: DepthEncoding) -> f32 {
     let c = encoding.from_device;
     let depth = abs((c.x + c.y * device) / (c.z + c.w * device));
-    let is_surface = is_finite(device) && device > encoding.sky.x && device < encoding.sky.y
-        && is_finite(depth) && depth > 0.0 && depth < SKY_DEPTH;
+    let is_within = vec4<f32>(encoding.sky.x, device, 0.0, depth) < vec4<f32>(device, encoding.sky.y, depth, SKY_DEPTH);
+    let is_surface = all(vec3<bool>(is_finite(device), is_finite(depth), all(is_within)));
     return select(SKY_DEPTH, depth, is_surface);
 }
 
@@ -82,10 +83,10 @@ fn decode_depth(pixel: vec2<u32>, encoding: DepthEncoding) -> f32 {
 // x: by how much 1/depth differs from a pixel's own (with parallel rays: depth, and the other way round), as a share of it:
 // over a plane that is linear. y: 1 where it is known; else both are 0.
 fn depth_change(texel: vec2<i32>, own: f32, encoding: DepthEncoding) -> vec2<f32> {
-    let last = vec2<i32>(frame.size) - 1;
-    let depth = decode_depth(vec2<u32>(clamp(texel, vec2<i32>(0), last)), encoding);
+    let on_screen = clamp(texel, vec2<i32>(0), vec2<i32>(frame.size) - 1);
+    let depth = decode_depth(vec2<u32>(on_screen), encoding);
     let change = select(own / depth - 1.0, 1.0 - depth / own, frame.clip_w.y == 0.0);
-    let is_known = all(texel >= vec2<i32>(0)) && all(texel <= last) && depth < SKY_DEPTH;
+    let is_known = all(vec3<bool>(texel == on_screen, depth < SKY_DEPTH));
     return select(vec2<f32>(0.0), vec2<f32>(clamp(change, -1e6, 1e6), 1.0), is_known);
 }
 
@@ -93,7 +94,7 @@ fn depth_change(texel: vec2<i32>, own: f32, encoding: DepthEncoding) -> vec2<f32
 fn slope_towards(pixel: vec2<i32>, step: vec2<i32>, own: f32, encoding: DepthEncoding) -> vec2<f32> {
     let near = depth_change(pixel + step, own, encoding);
     let far = depth_change(pixel + 2 * step, own, encoding);
-    let bend = select(1.0, far.x - 2.0 * near.x, far.y > 0.0 && near.y > 0.0);
+    let bend = select(1.0, far.x - 2.0 * near.x, far.y * near.y > 0.0);
     return vec2<f32>(near.x, 1.0 / (bend * bend + 1e-10));
 }
 
