@@ -10,11 +10,11 @@
 //! in   blocks        rgba32uint   block   of the input: statistics, outliers' excess spread (block statistics)
 //! in   samples       rg32uint     block   second and third largest luminance (outlier spread)
 //! in   light         r32uint      block   whether the light changed (light change)
-//! in   tiles, args   lists                tiles to denoise
+//! in   tiles, args   lists                tiles to denoise, or blocks (whole blocks)
 //! out  history       rgba16float  full    accumulated radiance, its length, noise and hit share
 //!
-//! Grid: one 8x8 workgroup per listed tile (indirect). Loads 4 blocks, 8 guides, 8 histories (one history: 4 and 4), 9
-//! radiances at most.
+//! Grid: one workgroup per listed tile or four listed blocks (indirect). Loads 4 blocks, 8 guides, 8 histories (one
+//! history: 4 and 4), 9 radiances at most.
 //! After: accumulation as in Schied et al. 2017 (SVGF); reflected points after Lagarde and de Rousiers 2014 (dominant
 //! direction of the lobe). The two candidates are mixed by how well each fits the blocks of this frame; how far they
 //! lie apart, against the footprint, bounds what history is worth.
@@ -39,13 +39,16 @@ override BOTH_HISTORIES: bool = true;
 // Moves the reflected point back to where it was.
 override HIT_MOTION: bool = false;
 // Clips history of smooth surfaces to what the neighbourhood makes plausible.
-override HISTORY_CLIP: bool = true;
+override HISTORY_CLIP: bool = false;
 // Forgets history where the light changed.
 override LIGHT_CHANGE: bool = true;
 // Cuts outliers off and adds what was cut off, spread.
 override OUTLIER_SPREAD: bool = true;
 // There are blocks of this frame's input to compare with.
 override BLOCK_STATISTICS: bool = true;
+
+// Whole blocks have a pass of their own, and the list of blocks holds the others.
+override WHOLE_BLOCKS: bool = false;
 
 @group(0) @binding(5) var in_motion: texture_2d<f32>;
 @group(0) @binding(7) var in_hit_motion: texture_2d<f32>;
@@ -58,6 +61,8 @@ override BLOCK_STATISTICS: bool = true;
 @group(1) @binding(6) var<storage, read> in_tiles: array<u32>;
 @group(1) @binding(7) var<storage, read> in_args: array<vec4<u32>, 4>;
 @group(1) @binding(8) var out_history: texture_storage_2d<rgba16float, write>;
+@group(1) @binding(9) var<storage, read> in_block_list: array<u32>;
+@group(1) @binding(10) var<storage, read> in_block_args: array<vec4<u32>, 3>;
 
 // Share of the blocks around a pixel that has to show its surface.
 const FIT: f32 = 0.2;
@@ -171,51 +176,6 @@ fn load_prev_guide(texel: vec2<i32>) -> Guide {
     return decode_prev_guide(texel);
 }
 
-// Blends those of four texels that show the surface. The plane test is done with last frame's depths where that camera
-// saw them, so that a camera that moves forward does not fail it.
-fn history_at(prev_uv: vec2<f32>, guide: Guide, position: vec3<f32>, share: f32, tolerance: Tolerance) -> Found {
-    let size = vec2<f32>(frame.prev_size);
-    let place = prev_uv * size;
-    if !(all(place > vec2<f32>(0.0)) && all(place < size)) {
-        return nothing_found();
-    }
-    // Distance from the plane of the surface of a place in last frame's pixels.
-    let offset_of_plane = vec4<f32>(0.0, 0.0, 0.0, dot(guide.normal, position));
-    let plane = vec4<f32>(guide.normal, 0.0) * frame.world_from_prev_pixel - offset_of_plane;
-    let base = floor(place - 0.5);
-    // In steps: of a still image the rest is rounding, which would leak light from lamps.
-    let fraction = round((place - 0.5 - base) * 256.0) * (1.0 / 256.0);
-    let last = vec2<i32>(frame.prev_size) - 1;
-    var radiance = vec3<f32>(0.0);
-    var length_and_share = vec2<f32>(0.0);
-    var weight = 0.0;
-    for (var i = 0u; i < 4u; i++) {
-        let offset = vec2<u32>(i & 1u, i >> 1u);
-        let texel = clamp(vec2<i32>(base) + vec2<i32>(offset), vec2<i32>(0), last);
-        let tap = load_prev_guide(texel);
-        let history = unpack_history(textureLoad(in_history, texel, 0));
-        let w_of_tap = frame.prev_clip_w.x + frame.prev_clip_w.y * tap.depth;
-        let from_plane = dot(plane, vec4<f32>((vec2<f32>(texel) + 0.5) * w_of_tap, tap.depth, 1.0));
-        let is_same = tap.denoised
-            && abs(from_plane) < tolerance.plane * guide.depth
-            && dot(tap.normal, guide.normal) > tolerance.cosine
-            && abs(tap.roughness - guide.roughness) <= 0.5 * guide.roughness + 0.15
-            && abs(history.share - share) < tolerance.share
-            && history.length > 0.0;
-        let bilinear = select(1.0 - fraction, fraction, offset == vec2<u32>(1u));
-        let w = select(0.0, bilinear.x * bilinear.y, is_same);
-        radiance += select(vec3<f32>(0.0), history.radiance, is_same) * w;
-        length_and_share += vec2<f32>(history.length, history.share) * w;
-        weight += w;
-    }
-    if weight < 0.02 {
-        return nothing_found();
-    }
-    let normalization = 1.0 / weight;
-    let exposed = min(radiance * (normalization * frame.exposure), vec3<f32>(HALF_MAX));
-    return Found(exposed, length_and_share.x * normalization, length_and_share.y * normalization, true);
-}
-
 fn squeezed(c: vec3<f32>) -> vec3<f32> {
     return c / (1.0 + c);
 }
@@ -263,15 +223,64 @@ fn image_motion(pixel: vec2<u32>, normal: vec3<f32>, dominant: f32) -> vec3<f32>
     return usable - normal * ((1.0 + dominant) * dot(usable, normal));
 }
 
-// A pixel, and this frame's sample of it.
+// What history is looked for: a pixel, or a whole block.
 struct Subject {
     guide: Guide,
     position: vec3<f32>,
     around: Surroundings,
-    // Exposed.
+    // This frame's sample, exposed.
     radiance: vec3<f32>,
     // Hit share.
     share: f32,
+    is_whole: bool,
+}
+
+// Blends those of four texels that show the surface. The plane test is done with last frame's depths where that camera
+// saw them, so that a camera that moves forward does not fail it.
+fn history_at(prev_uv: vec2<f32>, subject: Subject, tolerance: Tolerance) -> Found {
+    let guide = subject.guide;
+    let size = vec2<f32>(frame.prev_size);
+    let place = prev_uv * size;
+    if !(all(place > vec2<f32>(0.0)) && all(place < size)) {
+        return nothing_found();
+    }
+    // Distance from the plane of the surface of a place in last frame's pixels.
+    let offset_of_plane = vec4<f32>(0.0, 0.0, 0.0, dot(guide.normal, subject.position));
+    let plane = vec4<f32>(guide.normal, 0.0) * frame.world_from_prev_pixel - offset_of_plane;
+    // Of whole blocks, the mean of where their quarters were: history that is the same over a block moves by part of one.
+    let stride = select(1.0, 2.0, subject.is_whole);
+    let base = floor(place - 0.5 * stride);
+    // In steps: of a still image the rest is rounding, which would leak light from lamps.
+    let fraction = select(round((place - 0.5 - base) * 256.0) * (1.0 / 256.0), vec2<f32>(0.5), subject.is_whole);
+    let last = vec2<i32>(frame.prev_size) - 1;
+    var radiance = vec3<f32>(0.0);
+    var length_and_share = vec2<f32>(0.0);
+    var weight = 0.0;
+    for (var i = 0u; i < 4u; i++) {
+        let offset = vec2<u32>(i & 1u, i >> 1u);
+        let texel = clamp(vec2<i32>(base) + vec2<i32>(vec2<f32>(offset) * stride), vec2<i32>(0), last);
+        let tap = load_prev_guide(texel);
+        let history = unpack_history(textureLoad(in_history, texel, 0));
+        let w_of_tap = frame.prev_clip_w.x + frame.prev_clip_w.y * tap.depth;
+        let from_plane = dot(plane, vec4<f32>((vec2<f32>(texel) + 0.5) * w_of_tap, tap.depth, 1.0));
+        let is_same = tap.denoised
+            && abs(from_plane) < tolerance.plane * guide.depth
+            && dot(tap.normal, guide.normal) > tolerance.cosine
+            && abs(tap.roughness - guide.roughness) <= 0.5 * guide.roughness + 0.15
+            && abs(history.share - subject.share) < tolerance.share
+            && history.length > 0.0;
+        let bilinear = select(1.0 - fraction, fraction, offset == vec2<u32>(1u));
+        let w = select(0.0, bilinear.x * bilinear.y, is_same);
+        radiance += select(vec3<f32>(0.0), history.radiance, is_same) * w;
+        length_and_share += vec2<f32>(history.length, history.share) * w;
+        weight += w;
+    }
+    if weight < 0.02 {
+        return nothing_found();
+    }
+    let normalization = 1.0 / weight;
+    let exposed = min(radiance * (normalization * frame.exposure), vec3<f32>(HALF_MAX));
+    return Found(exposed, length_and_share.x * normalization, length_and_share.y * normalization, true);
 }
 
 // What a pixel knows of its surroundings by itself: the sample, and nothing about hit distances.
@@ -291,7 +300,7 @@ fn subject_of(pixel: vec2<u32>, guide: Guide) -> Subject {
     let own_share = select(around.share, hit_share(distance, camera_distance_of(position)), distance > 0.0);
     // Single hit distances of rough surfaces say little, and go with the colour of their sample.
     let share = mix(own_share, around.share, smoothstep(0.03, 0.2, guide.roughness) * around.fit);
-    return Subject(guide, position, around, sample_of(pixel, guide, around), share);
+    return Subject(guide, position, around, sample_of(pixel, guide, around), share, false);
 }
 
 // The two histories that a pixel can have, and where they were last frame.
@@ -316,7 +325,7 @@ fn candidates_of(pixel: vec2<u32>, subject: Subject) -> Candidates {
         moves = length((found.surface_uv - static_uv) * vec2<f32>(frame.size)) > 0.5;
         by_surface = Tolerance(select(0.01, 0.1, moves), select(0.9, 0.7, moves), share_tolerance);
         if BOTH_HISTORIES || !MIRROR_PARALLAX {
-            found.surface = history_at(found.surface_uv, subject.guide, subject.position, subject.share, by_surface);
+            found.surface = history_at(found.surface_uv, subject, by_surface);
         }
     }
     if MIRROR_PARALLAX {
@@ -337,7 +346,7 @@ fn candidates_of(pixel: vec2<u32>, subject: Subject) -> Candidates {
             place = found.surface_uv;
             tolerance = by_surface;
         }
-        let history = history_at(place, subject.guide, subject.position, subject.share, tolerance);
+        let history = history_at(place, subject, tolerance);
         if is_by_surface {
             found.surface = history;
         } else {
@@ -382,47 +391,80 @@ fn chosen(candidates: Candidates, subject: Subject) -> Found {
     return found;
 }
 
-fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
-    let subject = subject_of(pixel, guide);
-    var radiance = subject.radiance;
-    let share = subject.share;
-    var found = chosen(candidates_of(pixel, subject), subject);
+// History, as far as this frame bears it out.
+fn believed(history: Found, pixel: vec2<u32>, subject: Subject) -> Found {
+    let roughness = subject.guide.roughness;
+    var found = history;
     if LIGHT_CHANGE {
         let light = unpack_light(textureLoad(in_light, pixel / BLOCK_SIZE, 0).x);
-        found.length *= 1.0 - light.changed * smoothstep(0.05, 0.2, guide.roughness);
+        found.length *= 1.0 - light.changed * smoothstep(0.05, 0.2, roughness);
     }
     if HISTORY_CLIP {
-        let bounded = clipped(found.radiance, radiance, pixel, guide.roughness);
-        found.radiance = select(found.radiance, bounded, guide.roughness < frame.accumulate_clip_roughness);
+        let bounded = clipped(found.radiance, subject.radiance, pixel, roughness);
+        found.radiance = select(found.radiance, bounded, roughness < frame.accumulate_clip_roughness);
     }
     if OUTLIER_SPREAD {
         // What one frame saw, and none sees again.
         let seen = UNSEEN_FACTOR * frame.outlier_factor * found.length * luminance(subject.around.mean);
         let bound = min(1.0, seen / luminance(found.radiance));
-        found.radiance *= select(1.0, bound, guide.roughness >= UNSEEN_FROM);
-        // Two outliers in a block hide each other.
-        let expected = max(peaks_of(pixel).y, luminance(found.radiance));
-        let limit = min(1.0, PAIR_FACTOR * frame.outlier_factor * expected / luminance(radiance));
-        radiance *= select(1.0, limit, found.length >= 1.0 && guide.roughness >= OUTLIER_ROUGHNESS);
+        found.radiance *= select(1.0, bound, roughness >= UNSEEN_FROM);
     }
-    let rate = 1.0 / (found.length + 1.0);
+    return found;
+}
+
+// Luminance above which a sample is one of two outliers in a block, which hide each other.
+fn pair_limit(pixel: vec2<u32>, found: Found) -> f32 {
+    return PAIR_FACTOR * frame.outlier_factor * max(peaks_of(pixel).y, luminance(found.radiance));
+}
+
+fn without_pair(radiance: vec3<f32>, pair_limit: f32, found: Found, roughness: f32) -> vec3<f32> {
+    let limit = min(1.0, pair_limit / luminance(radiance));
+    return radiance * select(1.0, limit, found.length >= 1.0 && roughness >= OUTLIER_ROUGHNESS);
+}
+
+fn squared_residual(radiance: vec3<f32>, found: Found) -> f32 {
     let residual = brightness(radiance) - brightness(found.radiance);
+    return residual * residual;
+}
+
+// History with this frame's radiance.
+fn continued(found: Found, radiance: vec3<f32>, share: f32, squared_residual: f32) -> History {
+    let rate = 1.0 / (found.length + 1.0);
     var history: History;
     history.radiance = blend(found.radiance, radiance, rate) * frame.inverse_exposure;
     history.length = found.length + 1.0;
     history.share = select(share, mix(found.share, share, max(rate, 0.1)), found.length > 0.0);
     // The residual has the variance of the sample and of the history; what is left of both after mixing.
-    history.noise = select(-1.0, residual * residual * found.length * rate * rate, found.length >= 0.5);
+    history.noise = select(-1.0, squared_residual * found.length * rate * rate, found.length >= 0.5);
     return history;
+}
+
+fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
+    let subject = subject_of(pixel, guide);
+    let found = believed(chosen(candidates_of(pixel, subject), subject), pixel, subject);
+    var radiance = subject.radiance;
+    if OUTLIER_SPREAD {
+        radiance = without_pair(radiance, pair_limit(pixel, found), found, guide.roughness);
+    }
+    return continued(found, radiance, subject.share, squared_residual(radiance, found));
 }
 
 @compute @workgroup_size(8, 8)
 fn accumulate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let index = list_index(group);
-    if index >= in_args[0].w {
-        return;
+    var pixel: vec2<u32>;
+    if WHOLE_BLOCKS {
+        let index = listed_block_index(group, lane);
+        if index >= in_block_args[0].w {
+            return;
+        }
+        pixel = unpack_tile(in_block_list[index]) * BLOCK_SIZE + position_in_block(lane);
+    } else {
+        let index = list_index(group);
+        if index >= in_args[0].w {
+            return;
+        }
+        pixel = unpack_tile(in_tiles[index]) * TILE_SIZE + lane_position(lane);
     }
-    let pixel = unpack_tile(in_tiles[index]) * TILE_SIZE + lane_position(lane);
     if any(pixel >= frame.size) {
         return;
     }

@@ -27,6 +27,8 @@ import package::shared::tiles;
 override ACCUMULATED: bool = false;
 // Cuts outliers off.
 override OUTLIER_SPREAD: bool = true;
+// Later passes work on whole blocks.
+override WHOLE_BLOCKS: bool = false;
 // Some later pass uses `samples`.
 override SAMPLES_ARE_USED: bool = false;
 
@@ -35,6 +37,9 @@ override SAMPLES_ARE_USED: bool = false;
 @group(1) @binding(3) var out_samples: texture_storage_2d<rg32uint, write>;
 @group(1) @binding(4) var<storage, read> in_tiles: array<u32>;
 @group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 4>;
+
+// Weight that the surface of the least fitting pixel of a whole block has.
+const WHOLE_WEIGHT: f32 = 0.37;
 
 // What stands for a block.
 struct Choice {
@@ -111,6 +116,7 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
     var noise = vec2<f32>(0.0);
     var moments = vec2<f32>(0.0);
     var squared_weight = 0.0;
+    var least_weight = 1.0;
     let size = pixel_count(corner);
     for (var i = 0u; i < 4u * size.y; i++) {
         let pixel = corner + vec2<u32>(i & 3u, i >> 2u);
@@ -140,6 +146,7 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
         let b = brightness(c);
         moments += vec2<f32>(b, b * b) * w;
         squared_weight += w * w;
+        least_weight = min(least_weight, w);
     }
     let normalization = 1.0 / max(radiance.w, 1e-6);
     moments *= normalization;
@@ -155,6 +162,9 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
         variance = mix(variance, noise.x / max(noise.y, 1e-6), smoothstep(0.0, 0.5, noise.y * normalization));
     }
     block.deviation = sqrt(variance);
+    if WHOLE_BLOCKS {
+        block.is_whole = least_weight >= WHOLE_WEIGHT && all(size == vec2<u32>(BLOCK_SIZE));
+    }
     if SAMPLES_ARE_USED {
         let peaks = min(vec2<f32>(choice.peaks.y, choice.peaks.z), vec2<f32>(HALF_MAX));
         let brightness_and_weight = vec2<f32>(moments.x, squared_weight * normalization * normalization);

@@ -15,11 +15,6 @@ const RAY_GROUP_SIZE: u32 = 64u;
 @group(1) @binding(0) var<storage, read_write> inout_counters: array<u32, 4>;
 @group(1) @binding(1) var<storage, read_write> out_args: array<vec4<u32>, 4>;
 
-fn list_grid(groups: u32, length: u32) -> vec4<u32> {
-    let rows = (groups + LIST_GRID_WIDTH - 1u) / LIST_GRID_WIDTH;
-    return vec4<u32>(min(groups, LIST_GRID_WIDTH), rows, 1u, length);
-}
-
 @compute @workgroup_size(1)
 fn indirect_args() {
     let rays = inout_counters[2];

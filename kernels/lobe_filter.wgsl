@@ -4,12 +4,13 @@
 //! in   history       rgba16float   full    this frame's accumulated radiance
 //! in   guide         rg32uint      full    packed G-buffer, or normal, roughness, depth
 //! in   blocks        rgba32uint    block   accumulated radiance filtered over the footprint, its deviation
-//! in   tiles, args   lists                 tiles to denoise
+//! in   tiles, args   lists                 tiles to denoise, or blocks (whole blocks)
 //! in   radiance      any float     full    input fallback
 //! out  output        rgba16float   full    rgb: denoised radiance; a: variance of its brightness, 0..1
 //! out  prev_guide    r32uint       full    what the next frame wants to know of the G-buffer (G-buffer copy)
 //!
-//! Grid: one 8x8 workgroup per listed tile (indirect). Loads 4 blocks, and a history and a guide for each near tap.
+//! Grid: one workgroup per listed tile or four listed blocks (indirect). Loads 4 blocks, and a history and a guide for
+//! each near tap.
 //! Weights depend on the surface, on hit distance and on how settled a tap is; on colour for mirrors only: elsewhere
 //! that would darken, as bright samples are rare.
 
@@ -28,6 +29,8 @@ import package::shared::fallback;
 override NEAR_TAPS: u32 = 12u;
 // There are filtered blocks.
 override WIDE_FILTER: bool = true;
+// Whole blocks have a pass of their own, and the list of blocks holds the others.
+override WHOLE_BLOCKS: bool = false;
 
 @group(1) @binding(2) var in_history: texture_2d<f32>;
 @group(1) @binding(3) var in_blocks: texture_2d<u32>;
@@ -35,6 +38,8 @@ override WIDE_FILTER: bool = true;
 @group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 4>;
 @group(1) @binding(6) var out_output: texture_storage_2d<rgba16float, write>;
 @group(1) @binding(7) var out_prev_guide: texture_storage_2d<r32uint, write>;
+@group(1) @binding(8) var<storage, read> in_block_list: array<u32>;
+@group(1) @binding(9) var<storage, read> in_block_args: array<vec4<u32>, 3>;
 
 // Near taps reach from so many pixels, for mirrors, to so many.
 const NEAR_LEAST: f32 = 1.7;
@@ -153,26 +158,43 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     return vec4<f32>(blend(near, wide.radiance, by_blocks), wide.variance);
 }
 
+// As the caller has it.
+fn without_exposure(filtered: vec4<f32>) -> vec4<f32> {
+    return vec4<f32>(min(filtered.rgb * frame.inverse_exposure, vec3<f32>(HALF_MAX)), filtered.a);
+}
+
+fn store_result(pixel: vec2<u32>, guide: Guide, result: vec4<f32>) {
+    textureStore(out_output, pixel, rounded_to_half(result));
+    if GBUFFER_IS_COPIED {
+        textureStore(out_prev_guide, pixel, vec4<u32>(pack_prev_guide(guide), 0u, 0u, 0u));
+    }
+}
+
 @compute @workgroup_size(8, 8)
 fn lobe_filter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let index = list_index(group);
-    if index >= in_args[0].w {
-        return;
+    var pixel: vec2<u32>;
+    if WHOLE_BLOCKS {
+        let index = listed_block_index(group, lane);
+        if index >= in_block_args[0].w {
+            return;
+        }
+        pixel = unpack_tile(in_block_list[index]) * BLOCK_SIZE + position_in_block(lane);
+    } else {
+        let index = list_index(group);
+        if index >= in_args[0].w {
+            return;
+        }
+        pixel = unpack_tile(in_tiles[index]) * TILE_SIZE + lane_position(lane);
     }
-    let pixel = unpack_tile(in_tiles[index]) * TILE_SIZE + lane_position(lane);
     if any(pixel >= frame.size) {
         return;
     }
     let guide = load_guide(pixel);
     var result: vec4<f32>;
     if guide.denoised {
-        result = filtered(pixel, guide);
-        result = vec4<f32>(min(result.rgb * frame.inverse_exposure, vec3<f32>(HALF_MAX)), result.a);
+        result = without_exposure(filtered(pixel, guide));
     } else {
         result = vec4<f32>(fallback_radiance(pixel, guide), 0.0);
     }
-    textureStore(out_output, pixel, rounded_to_half(result));
-    if GBUFFER_IS_COPIED {
-        textureStore(out_prev_guide, pixel, vec4<u32>(pack_prev_guide(guide), 0u, 0u, 0u));
-    }
+    store_result(pixel, guide, result);
 }

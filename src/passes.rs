@@ -74,6 +74,10 @@ pub(crate) enum GridTemplate {
     Tiles(u32),
     /// A list of `args`.
     List(u64),
+    /// The list of tiles, by pixel; where there are lists of blocks, those of them that are not whole.
+    Pixels,
+    /// A list of `block_args`.
+    Blocks(u64),
 }
 
 /// Gives tiles without work their fallback value, in both pipelines.
@@ -214,6 +218,35 @@ const PASSES: &[PassTemplate] = &[
     },
 ];
 
+const ACCUMULATE_BINDINGS: &[(&str, &str, Copy)] = &[
+    ("in_radiance", "radiance", Current),
+    ("in_motion", "motion", Current),
+    ("in_hit_motion", "hit_motion", Current),
+    ("in_prev_guide", "prev_guide", Current),
+    ("in_history", "history", Previous),
+    ("in_blocks", BLOCKS, Current),
+    ("in_samples", "samples", Current),
+    ("in_light", "light", Current),
+    ("in_tiles", "tiles", Current),
+    ("in_args", "args", Current),
+    ("in_block_list", "block_list", Current),
+    ("in_block_args", "block_args", Current),
+    ("out_history", "history", Current),
+];
+
+const LOBE_FILTER_BINDINGS: &[(&str, &str, Copy)] = &[
+    ("in_radiance", "radiance", Current),
+    ("in_environment", "environment", Current),
+    ("in_history", "history", Current),
+    ("in_blocks", BLOCKS, Current),
+    ("in_tiles", "tiles", Current),
+    ("in_args", "args", Current),
+    ("in_block_list", "block_list", Current),
+    ("in_block_args", "block_args", Current),
+    ("out_prev_guide", "prev_guide", Current),
+    ("out_output", OUTPUT, Current),
+];
+
 /// Accumulates first, filters over the lobe's footprint after. Follows the first three of `PASSES`. Passes over blocks
 /// read the `blocks` that the last such pass wrote and write the other ones.
 const FOOTPRINT_PASSES: &[PassTemplate] = &[
@@ -223,7 +256,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         is_needed: has_input_blocks,
         stage: Stage::Denoise,
         grid: GridTemplate::List(3),
-        overrides: &["OUTLIER_SPREAD", "SAMPLES_ARE_USED"],
+        overrides: &["OUTLIER_SPREAD", "SAMPLES_ARE_USED", "WHOLE_BLOCKS"],
         bindings: &[
             ("in_radiance", "radiance", Current),
             ("in_tiles", "tiles", Current),
@@ -251,6 +284,31 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         ],
     },
     PassTemplate {
+        name: "list_blocks",
+        kernel: "list_blocks",
+        is_needed: has_whole_blocks,
+        stage: Stage::Denoise,
+        grid: GridTemplate::List(3),
+        overrides: &[],
+        bindings: &[
+            ("in_blocks", BLOCKS, Current),
+            ("in_tiles", "tiles", Current),
+            ("in_args", "args", Current),
+            ("inout_block_counters", "block_counters", Current),
+            ("out_block_list", "block_list", Current),
+        ],
+    },
+    // While `block_spread` runs.
+    PassTemplate {
+        name: "block_args",
+        kernel: "block_args",
+        is_needed: has_whole_blocks,
+        stage: Stage::Denoise,
+        grid: GridTemplate::One,
+        overrides: &[],
+        bindings: &[("inout_block_counters", "block_counters", Current), ("out_block_args", "block_args", Current)],
+    },
+    PassTemplate {
         name: "block_spread",
         kernel: "block_spread",
         is_needed: |settings| settings.features.outlier_spread,
@@ -269,7 +327,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "accumulate",
         is_needed: always,
         stage: Stage::Denoise,
-        grid: GridTemplate::List(0),
+        grid: GridTemplate::Pixels,
         overrides: &[
             "MIRROR_PARALLAX",
             "SURFACE_MOTION",
@@ -279,20 +337,25 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             "LIGHT_CHANGE",
             "OUTLIER_SPREAD",
             "BLOCK_STATISTICS",
+            "WHOLE_BLOCKS",
         ],
-        bindings: &[
-            ("in_radiance", "radiance", Current),
-            ("in_motion", "motion", Current),
-            ("in_hit_motion", "hit_motion", Current),
-            ("in_prev_guide", "prev_guide", Current),
-            ("in_history", "history", Previous),
-            ("in_blocks", BLOCKS, Current),
-            ("in_samples", "samples", Current),
-            ("in_light", "light", Current),
-            ("in_tiles", "tiles", Current),
-            ("in_args", "args", Current),
-            ("out_history", "history", Current),
+        bindings: ACCUMULATE_BINDINGS,
+    },
+    PassTemplate {
+        name: "accumulate_blocks",
+        kernel: "accumulate_blocks",
+        is_needed: has_whole_blocks,
+        stage: Stage::Denoise,
+        grid: GridTemplate::Blocks(2),
+        overrides: &[
+            "MIRROR_PARALLAX",
+            "SURFACE_MOTION",
+            "BOTH_HISTORIES",
+            "HIT_MOTION",
+            "LIGHT_CHANGE",
+            "OUTLIER_SPREAD",
         ],
+        bindings: ACCUMULATE_BINDINGS,
     },
     // While last frame's textures and the blocks are what `accumulate` saw.
     PassTemplate {
@@ -357,18 +420,18 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "lobe_filter",
         is_needed: always,
         stage: Stage::Denoise,
-        grid: GridTemplate::List(0),
-        overrides: &["FALLBACK", "NEAR_TAPS", "WIDE_FILTER"],
-        bindings: &[
-            ("in_radiance", "radiance", Current),
-            ("in_environment", "environment", Current),
-            ("in_history", "history", Current),
-            ("in_blocks", BLOCKS, Current),
-            ("in_tiles", "tiles", Current),
-            ("in_args", "args", Current),
-            ("out_prev_guide", "prev_guide", Current),
-            ("out_output", OUTPUT, Current),
-        ],
+        grid: GridTemplate::Pixels,
+        overrides: &["FALLBACK", "NEAR_TAPS", "WIDE_FILTER", "WHOLE_BLOCKS"],
+        bindings: LOBE_FILTER_BINDINGS,
+    },
+    PassTemplate {
+        name: "lobe_filter_blocks",
+        kernel: "lobe_filter_blocks",
+        is_needed: has_whole_blocks,
+        stage: Stage::Denoise,
+        grid: GridTemplate::Blocks(1),
+        overrides: &[],
+        bindings: LOBE_FILTER_BINDINGS,
     },
 ];
 
@@ -391,6 +454,12 @@ fn has_input_blocks(settings: &Settings) -> bool {
 
 fn has_wide_filter(settings: &Settings) -> bool {
     settings.features.spatial_filter && settings.features.wide_filter
+}
+
+/// Whether blocks that show one rough surface are worked on as a whole.
+pub(crate) fn has_whole_blocks(settings: &Settings) -> bool {
+    let features = &settings.features;
+    features.whole_blocks && features.compares_with_blocks() && has_wide_filter(settings)
 }
 
 fn has_debug_view(settings: &Settings) -> bool {
@@ -447,6 +516,9 @@ pub(crate) fn all_resources() -> Vec<Resource> {
         resource("rays", buffer(4, Count::Per(Extent::Full), false), Lifetime::Transient, false),
         resource("counters", buffer(4, Count::Fixed(4), false), Lifetime::Persistent, false),
         resource("args", buffer(16, Count::Fixed(4), true), Lifetime::Transient, false),
+        resource("block_list", buffer(4, Count::Per(Extent::Block), false), Lifetime::Transient, false),
+        resource("block_counters", buffer(4, Count::Fixed(2), false), Lifetime::Persistent, false),
+        resource("block_args", buffer(16, Count::Fixed(3), true), Lifetime::Transient, false),
     ]
 }
 
@@ -499,6 +571,7 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         "SAMPLES_ARE_USED" => f64::from(features.light_change || features.outlier_spread),
         "NEAR_TAPS" => f64::from(if features.spatial_filter { features.near_taps } else { 0 }),
         "WIDE_TAPS" => f64::from(features.wide_taps),
+        "WHOLE_BLOCKS" => f64::from(has_whole_blocks(settings)),
         "WIDE_FILTER" => f64::from(has_wide_filter(settings)),
         "AVERAGE_IS_READ" => f64::from(features.history_clip || features.average_mixing),
         "MIRROR_PARALLAX" => f64::from(features.mirror_parallax),

@@ -11,7 +11,7 @@ use crate::frame::check_allocation;
 use crate::kernel::{self, Kernel, Overrides, Sources};
 use crate::passes::{
     ARGS_STRIDE, BLOCKS, EXPORTED, GBUFFER_OVERRIDES, GridTemplate, OTHER_BLOCKS, OUTPUT_VARIABLE, PassTemplate,
-    SHARED_BINDINGS, all_resources, override_value, resource_of, templates,
+    SHARED_BINDINGS, all_resources, has_whole_blocks, override_value, resource_of, templates,
 };
 use crate::resource::Copy::{self, Previous};
 use crate::resource::{Access, Kind, Lifetime, Resource, TILE_SIZE};
@@ -155,10 +155,14 @@ fn plan_pass<K: AsRef<Kernel>>(
             access: binding.kind.access(),
         });
     }
+    let list = |resource: &str, index| Grid::Indirect { resource: resource.to_owned(), offset: index * ARGS_STRIDE };
     let grid = match template.grid {
         GridTemplate::One => Grid::One,
         GridTemplate::Tiles(tiles) => Grid::Squares { side: tiles * TILE_SIZE },
-        GridTemplate::List(index) => Grid::Indirect { resource: "args".to_owned(), offset: index * ARGS_STRIDE },
+        GridTemplate::List(index) => list("args", index),
+        GridTemplate::Blocks(index) => list("block_args", index),
+        GridTemplate::Pixels if has_whole_blocks(settings) => list("block_args", 0),
+        GridTemplate::Pixels => list("args", 0),
     };
     let (name, kernel_name) = (template.name.to_owned(), template.kernel.to_owned());
     let pass = Pass { name, kernel: kernel_name, stage: template.stage, overrides, grid, bindings };

@@ -297,6 +297,10 @@ pub struct Features {
     /// Footprint pipeline: most blocks on either side of a block, along and across the footprint, that filters over
     /// blocks read, 1 to 16. What lies between is passed over where footprints are wider.
     pub wide_taps: u32,
+    /// Footprint pipeline, with `wide_filter` and `block_statistics`: works on blocks of 4x4 pixels as a whole where
+    /// all of a block shows one surface and the footprint is wider than blocks are. A scene of smooth surfaces has no such
+    /// blocks.
+    pub whole_blocks: bool,
     /// Reads normals from the input `normal`. Without it they are the slope of `depth`, found once: only with
     /// `gbuffer_copy` and `packed_guide`. Normal maps and smooth shading are lost then, and `depth` has to be as precise as
     /// 32 bits are.
@@ -332,6 +336,7 @@ impl Default for Features {
             wide_filter: true,
             near_taps: 12,
             wide_taps: 4,
+            whole_blocks: true,
             normal_input: true,
             constant_roughness: None,
             gbuffer_copy: true,

@@ -38,7 +38,8 @@ fn off(pipeline: Pipeline) -> Vec<(&'static str, Change)> {
         ("edge_repair", |features| features.edge_repair = false),
         ("average_mixing", |features| features.average_mixing = false),
     ];
-    let footprint: [(&str, Change); 8] = [
+    let footprint: [(&str, Change); 9] = [
+        ("whole_blocks", |features| features.whole_blocks = false),
         ("both_histories", |features| features.both_histories = false),
         ("hit_motion", |features| features.hit_motion = false),
         ("light_change", |features| features.light_change = false),
@@ -284,6 +285,7 @@ fn what_a_scene_does_not_use_changes_nothing_over_footprints() {
     // Footprints of mirrors are no wider than a pixel: what the blocks add is how much of a difference is noise.
     let mirror = wall(0.005);
     let full = run(&mirror, executor, &[]);
+    assert_same("whole_blocks", &full, &run(&mirror, executor, &[find(Pipeline::Footprint, "whole_blocks")]));
     assert_same("outlier_spread", &full, &run(&mirror, executor, &[find(Pipeline::Footprint, "outlier_spread")]));
     // The comparison notices what is used.
     let filtered = run(&rough, executor, &[find(Pipeline::Footprint, "wide_filter")]);

@@ -98,6 +98,10 @@ proptest! {
         let spreads = usize::from(features.outlier_spread) + usize::from(features.spatial_filter && features.wide_filter);
         let averages = usize::from(features.block_statistics || features.outlier_spread || features.light_change)
             + usize::from(features.spatial_filter && features.wide_filter);
+        let compares = features.block_statistics || features.outlier_spread;
+        let has_whole = features.whole_blocks && compares && features.spatial_filter && features.wide_filter && !is_published;
+        prop_assert_eq!(plan.resource("block_list").is_some(), has_whole);
+        prop_assert_eq!(has_pass("accumulate_blocks"), has_whole);
         prop_assert_eq!(plan.resource("blocks").is_some(), !is_published && averages > 0);
         let planned = plan.passes.iter().filter(|pass| pass.kernel == "block_average").count();
         prop_assert_eq!(planned, if is_published { 0 } else { averages });

@@ -213,10 +213,11 @@ fn limpids_own_barriers() {
     check(&plan).unwrap();
     let passes: Vec<_> =
         plan.passes.iter().zip(plan.barriers()).filter(|(_, b)| b.is_some()).map(|(p, _)| p.kernel.as_str()).collect();
-    // Passes wait for each other, but `fill` and the second average wait for the same barrier.
+    // Passes wait for each other, but `fill` and the second average wait for the same barrier, and so do `block_args` and
+    // the first `block_spread`.
     let (plan, _) = Plan::new(&Settings::default(), UVec2::splat(64)).unwrap();
     check(&plan).unwrap();
-    assert_eq!(plan.barriers().iter().flatten().count(), 10);
+    assert_eq!(plan.barriers().iter().flatten().count(), 13);
     // `fill` only needs what came before `reproject` and runs beside `prefilter`.
     assert_eq!(passes, ["list_tiles", "indirect_args", "reproject", "prefilter", "resolve_temporal"]);
 }

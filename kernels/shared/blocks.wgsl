@@ -18,6 +18,8 @@ struct Block {
     share: f32,
     // Deviation of brightness, 0 to 1.
     deviation: f32,
+    // All of its pixels show its surface (whole blocks).
+    is_whole: bool,
 }
 
 // Three numbers of 9 bits with an exponent in common, rounded to nearest: rgb9e5.
@@ -39,8 +41,8 @@ fn pack_block(block: Block) -> vec4<u32> {
     let oct = vec2<u32>(round((oct_encode(block.guide.normal) * 0.5 + 0.5) * 511.0));
     let roughness = u32(round(saturate(block.guide.roughness) * 63.0));
     let share = u32(round(saturate(block.share) * 255.0));
-    // The last 8 bits of depth make room.
-    let depth = (bitcast<u32>(block.guide.depth) + 128u) & 0xffffff00u;
+    // The last 8 bits of depth and its sign make room.
+    let depth = ((bitcast<u32>(block.guide.depth) + 128u) & 0x7fffff00u) | select(0u, 0x80000000u, block.is_whole);
     let deviation = u32(round(saturate(block.deviation) * 255.0));
     return vec4<u32>(
         select(0u, depth | deviation, block.guide.denoised),
@@ -54,19 +56,26 @@ fn unpack_block(texel: vec4<u32>) -> Block {
     let oct = vec2<f32>(vec2<u32>(texel.y, texel.y >> 9u) & vec2<u32>(511u)) * (2.0 / 511.0) - 1.0;
     var block: Block;
     block.guide.normal = oct_decode(oct);
-    block.guide.depth = bitcast<f32>(texel.x & 0xffffff00u);
+    block.guide.depth = bitcast<f32>(texel.x & 0x7fffff00u);
     block.guide.roughness = f32((texel.y >> 18u) & 63u) * (1.0 / 63.0);
     block.guide.denoised = texel.x != 0u;
     block.share = f32(texel.y >> 24u) * (1.0 / 255.0);
     block.deviation = f32(texel.x & 255u) * (1.0 / 255.0);
     block.radiance = unpack_shared_exponent(texel.z);
     block.excess = unpack_shared_exponent(texel.w);
+    block.is_whole = texel.x >= 0x80000000u;
     return block;
 }
 
 // The largest indices of blocks on screen.
 fn last_block() -> vec2<i32> {
     return vec2<i32>((frame.size - 1u) / BLOCK_SIZE);
+}
+
+// How many there are on screen.
+fn block_count() -> u32 {
+    let counts = vec2<u32>(last_block()) + 1u;
+    return counts.x * counts.y;
 }
 
 // Place on screen, in pixels, that stands for a block.

@@ -42,6 +42,25 @@ fn list_index(group: vec3<u32>) -> u32 {
     return group.y * LIST_GRID_WIDTH + group.x;
 }
 
+// Blocks of their list that a workgroup of 64 invocations handles in passes over pixels of listed blocks.
+const BLOCKS_PER_GROUP: u32 = 4u;
+
+// Position in its list of the block that an invocation handles a pixel of.
+fn listed_block_index(group: vec3<u32>, lane: u32) -> u32 {
+    return list_index(group) * BLOCKS_PER_GROUP + lane / 16u;
+}
+
+// Workgroups in x, y and z that handle a list, and its length.
+fn list_grid(groups: u32, length: u32) -> vec4<u32> {
+    let rows = (groups + LIST_GRID_WIDTH - 1u) / LIST_GRID_WIDTH;
+    return vec4<u32>(min(groups, LIST_GRID_WIDTH), rows, 1u, length);
+}
+
+// Position inside a 4x4 block of an invocation.
+fn position_in_block(lane: u32) -> vec2<u32> {
+    return vec2<u32>(lane & 3u, (lane >> 2u) & 3u);
+}
+
 // Position inside an 8x8 tile of an invocation.
 fn lane_position(lane: u32) -> vec2<u32> {
     return vec2<u32>(lane % TILE_SIZE, lane / TILE_SIZE);

@@ -21,6 +21,8 @@ pub(super) const OUTLIER_ROUGHNESS: f32 = 0.015;
 pub(super) const LIGHT_ROUGHNESS: f32 = 0.05;
 /// Roughness from which on the reflected point's history alone is worth nothing (`kernels/accumulate.wgsl`).
 pub(super) const REFLECTION_UP_TO: f32 = 0.6;
+/// Roughness from which on blocks are worked on as a whole (`kernels/list_blocks.wgsl`).
+pub(super) const WHOLE_ROUGHNESS: f32 = 0.15;
 /// Pixels along a side of a cell whose light is compared.
 const CELL: u32 = 8;
 /// Fewest surfaces of a cell that say anything.

@@ -9,7 +9,7 @@ use limpid::{Plan, Settings};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use super::needs::{LIGHT_ROUGHNESS, OUTLIER_ROUGHNESS, REFLECTION_UP_TO};
+use super::needs::{LIGHT_ROUGHNESS, OUTLIER_ROUGHNESS, REFLECTION_UP_TO, WHOLE_ROUGHNESS};
 use super::{Content, Needs, percent};
 use crate::bench::counts::Counts;
 
@@ -178,6 +178,11 @@ fn footprint(needs: &Needs, settings: &Settings) -> Vec<Change> {
     } else if needs.continued >= ENOUGH_FRAMES && needs.light_changes <= CHANCE {
         let because = format!("light changes in {} of a frame at most", percent(needs.light_changes));
         changes.push(Change::off("light_change", because, "lamps stay as bright as they are"));
+    }
+    let whole_roughness = clip_roughness.max(WHOLE_ROUGHNESS);
+    if roughest < whole_roughness {
+        let because = format!("the roughest surface has {roughest:.3}; it acts from {whole_roughness} on");
+        changes.push(Change::off("whole_blocks", because, "no rougher material is added"));
     }
     if roughest < OUTLIER_ROUGHNESS {
         let because = format!("the roughest surface has {roughest:.3}; it acts from {OUTLIER_ROUGHNESS} on");

@@ -180,8 +180,15 @@ fn mirrors_at_rest_need_little() {
     let frames = mirrors_at_rest(6, false);
     let analysis = analysis_of(&frames, &Settings::default());
     let mut changes = analysis.changes.clone();
-    let expected =
-        ["constant_roughness", "spatial_filter", "light_change", "outlier_spread", "history_clip", "surface_motion"];
+    let expected = [
+        "constant_roughness",
+        "spatial_filter",
+        "light_change",
+        "whole_blocks",
+        "outlier_spread",
+        "history_clip",
+        "surface_motion",
+    ];
     assert_eq!(names(&changes), expected, "{analysis}");
     let [given, recommended] = &analysis.predicted;
     assert!(recommended.bytes < given.bytes && recommended.passes + 3 <= given.passes, "{analysis}");

@@ -10,7 +10,7 @@ use limpid::resource::{Access, Kind};
 use limpid::{Plan, Settings};
 use serde::{Deserialize, Serialize};
 
-/// Costs of a frame in which every pixel is denoised.
+/// Costs of a frame in which every pixel is denoised, and none in a whole block.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Counts {
     /// Dispatches.
@@ -38,10 +38,9 @@ fn input_bytes(name: &str) -> f64 {
     }
 }
 
-/// Whether a pass does next to nothing in a frame that is all denoised: left-out tiles, which it has not, are filled by
-/// one and cleared by the other.
+/// Whether a pass does next to nothing in such a frame: there are no left-out tiles to fill and to clear.
 fn is_idle(pass: &Pass) -> bool {
-    matches!(pass.kernel.as_str(), "fill" | "list_tiles")
+    matches!(pass.kernel.as_str(), "fill" | "list_tiles" | "accumulate_blocks" | "lobe_filter_blocks")
 }
 
 fn bytes(plan: &Plan, size: UVec2, wanted: fn(Access) -> bool) -> f64 {

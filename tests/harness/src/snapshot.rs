@@ -60,6 +60,15 @@ impl Snapshot {
             tiles[listed..left_out].fill(0);
             tiles[end..].fill(0);
         }
+        let [others, whole] = [3, 7].map(|word| self.0.get("block_args").map_or(0, |args| args[word] as usize));
+        if let Some(blocks) = self.0.get_mut("block_list") {
+            // As are whole blocks.
+            let end = (Count::Per(Extent::Block).of(frame) as usize).min(blocks.len());
+            blocks[..others].sort_unstable();
+            blocks[end - whole..end].sort_unstable();
+            blocks[others..end - whole].fill(0);
+            blocks[end..].fill(0);
+        }
         if let Some(list) = self.0.get_mut("rays") {
             let count = list.len();
             list[..rays.min(count)].sort_unstable();
