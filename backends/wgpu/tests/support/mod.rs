@@ -206,10 +206,11 @@ pub(crate) fn pipelines() -> [Settings; 2] {
     [linear_settings(), published_settings()]
 }
 
-/// Settings with history found by motion vectors alone and whatever its colour.
+/// Settings with history found by motion vectors alone and whatever its colour, for each pixel.
 pub(crate) fn by_motion_only(mut settings: Settings) -> Settings {
     settings.features.mirror_parallax = false;
     settings.features.light_change = false;
+    settings.features.whole_blocks = false;
     settings.reproject.surface_color_gate = 10_000.0;
     settings
 }
