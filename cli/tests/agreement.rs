@@ -47,12 +47,8 @@ fn check(cases: &[(String, Case)]) {
         for (name, agreement) in &table.0 {
             // The last digits of functions differ between devices (tests/precision.rs), which becomes a step of a
             // half float now and then and, rarely, another decision at a threshold.
-            // A block's radiance has 9 bits: a step of it is up to four of a half float, in all pixels that it decides.
-            let holds_blocks = ["blocks", "other_blocks", "output"].contains(&name.as_str());
-            let (differing, far) = if holds_blocks { (0.04, 0.01) } else { (0.01, 0.0015) };
-            assert!(agreement.differing() < differing, "{name}");
-            assert!((agreement.far as f64) < far * agreement.values as f64, "{name}");
-            assert!(agreement.mean() < 0.1, "{name}");
+            assert!(agreement.differing() < 0.01, "{name}");
+            assert!((agreement.far as f64) < 0.0015 * agreement.values as f64, "{name}");
         }
     }
 }
