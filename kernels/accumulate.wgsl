@@ -86,7 +86,7 @@ const MIRROR_UP_TO: f32 = 0.03;
 const PAIR_FACTOR: f32 = 12.0;
 // History counts up to so many times what bounds single outliers, against the blocks around, for each frame that it
 // holds, from this roughness on: below, what lobes see has edges.
-const UNSEEN_FACTOR: f32 = 4.0;
+const UNSEEN_FACTOR: f32 = 2.0;
 const UNSEEN_FROM: f32 = 0.1;
 // Deviation that a sample counts as having of which no block says one.
 const ALONE_DEVIATION: f32 = 0.1;
@@ -315,7 +315,7 @@ fn candidates_of(pixel: vec2<u32>, subject: Subject) -> Candidates {
     let r = subject.guide.roughness;
     let static_uv = prev_uv_of(subject.position);
     let is_rare = r >= OUTLIER_ROUGHNESS && luminance(subject.radiance) > RARE * luminance(subject.around.mean);
-    let share_tolerance = select(0.08 + 4.0 * r, 1.0, is_rare);
+    let share_tolerance = select(0.08 + 6.0 * r, 1.0, is_rare);
     var found = Candidates(static_uv, nothing_found(), vec2<f32>(-1.0), nothing_found());
     // Where it is not where the camera's motion alone would put it, something else moved the surface.
     var moves = false;

@@ -41,9 +41,19 @@ override WHOLE_BLOCKS: bool = false;
 @group(1) @binding(8) var<storage, read> in_block_list: array<u32>;
 @group(1) @binding(9) var<storage, read> in_block_args: array<vec4<u32>, 3>;
 
-// Near taps reach from so many pixels, for mirrors, to so many.
+// Least half axes, in pixels, over which the weight of near taps falls.
 const NEAR_LEAST: f32 = 1.7;
+// Most pixels that near taps reach. The least grows with their number, so that few of them meet in a pixel.
 const NEAR_MOST: f32 = 3.0;
+const NEAR_LEAST_REACH: f32 = 1.4;
+const REACH_OF_TAP: f32 = 0.05;
+// The variance of what was accumulated for few frames is high and the filter may err more: differences count for a
+// share of what they do, for a frame and for each one more. Whatever fits no tap takes a little of all.
+const YOUNG_DIFFERENCE: f32 = 0.3;
+const DIFFERENCE_OF_FRAME: f32 = 0.1;
+const YOUNG_FIT: f32 = 0.05;
+// As `NORMAL_TOLERANCE` between single pixels.
+const PIXEL_NORMAL_TOLERANCE: f32 = 0.02;
 // Half axis of the filter, in pixels, from and to which blocks take over.
 const WIDE_FROM: f32 = 0.7;
 const WIDE_TO: f32 = 2.5;
@@ -54,8 +64,12 @@ const SHARP_TO: f32 = 0.3;
 const SHARP_FROM: f32 = 0.7;
 // Weight of squared differences of brightness against their variance.
 const NOISE_FALLOFF: f32 = 0.1;
-// Taps of mirrors count as at most this many times as bright as the pixel.
-const GLINT_LIMIT: f32 = 8.0;
+// Taps count as at most so many times as bright as the pixel and a constant, times squared half axes of
+// `GLINT_AXIS` pixels: what is bright in narrow lobes has edges. New pixels, which know little, allow more.
+const GLINT_LIMIT: f32 = 4.0;
+const GLINT_FLOOR: f32 = 0.1;
+const GLINT_AXIS: f32 = 0.5;
+const GLINT_FRAMES: f32 = 4.0;
 
 // What the blocks around a pixel agree on.
 struct Wide {
@@ -88,6 +102,13 @@ fn trust(length: f32) -> f32 {
     return 0.2 + 0.8 * min(1.0, length * 0.25);
 }
 
+fn pixel_plane_of(guide: Guide, position: vec3<f32>) -> Plane {
+    let lobe = 1.0 / max(alpha_of(guide.roughness), PIXEL_NORMAL_TOLERANCE);
+    var plane = plane_of(guide, position);
+    plane.normal_scale = lobe * lobe;
+    return plane;
+}
+
 // Vogel's disk: each tap is turned against the one before by the golden angle.
 fn turned(direction: vec2<f32>) -> vec2<f32> {
     return vec2<f32>(direction.x * -0.737368878 - direction.y * 0.675490294, direction.x * 0.675490294 - direction.y * 0.737368878);
@@ -98,7 +119,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let own = unpack_history(textureLoad(in_history, pixel, 0));
     let own_radiance = min(own.radiance * frame.exposure, vec3<f32>(HALF_MAX));
     let position = world_position(pixel, guide.depth);
-    let plane = plane_of(guide, position);
+    let plane = pixel_plane_of(guide, position);
     let footprint = lobe_footprint(position, guide, own.share);
     let radius = vec2<f32>(footprint.along, footprint.across) * frame.filter_scale;
     let side = side_of(footprint.axis);
@@ -109,9 +130,15 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
 
     let sharp = 1.0 - smoothstep(SHARP_TO, SHARP_FROM, radius.x);
     let noise_falloff = NOISE_FALLOFF * sharp / (wide.variance + 1e-5);
-    let glint = GLINT_LIMIT * luminance(own_radiance);
+    let is_noisy = guide.roughness >= OUTLIER_ROUGHNESS;
+    let difference = select(1.0, min(1.0, YOUNG_DIFFERENCE + DIFFERENCE_OF_FRAME * (own.length - 1.0)), is_noisy);
+    let least_fit = select(0.0, YOUNG_FIT / (own.length * own.length), is_noisy);
+    let axis = radius.x * (1.0 / GLINT_AXIS);
+    let glint = (GLINT_LIMIT * luminance(own_radiance) + GLINT_FLOOR) * max(1.0, axis * axis)
+        * max(1.0, GLINT_FRAMES / own.length);
     let own_brightness = brightness(own_radiance);
-    let reach = clamp(radius, vec2<f32>(NEAR_LEAST), vec2<f32>(NEAR_MOST)) * inverseSqrt(max(f32(NEAR_TAPS), 1.0));
+    let least_reach = NEAR_LEAST_REACH + REACH_OF_TAP * f32(NEAR_TAPS);
+    let reach = clamp(radius, vec2<f32>(least_reach), vec2<f32>(NEAR_MOST)) * inverseSqrt(max(f32(NEAR_TAPS), 1.0));
     // From pixels to half axes.
     let falloff = 1.0 / max(radius, vec2<f32>(NEAR_LEAST));
     let rho_x = vec2<f32>(footprint.axis.x, side.x) * falloff;
@@ -126,7 +153,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     var brightest = 0.0;
     var next = 0.0;
     for (var i = 0u; i < taps; i++) {
-        let point = direction * (reach * sqrt(f32(i) + 0.5));
+        let point = direction * (reach * sqrt(f32(i) + 1.0));
         direction = turned(direction);
         let offset = round(footprint.axis * point.x + side * point.y);
         let at = vec2<i32>(pixel) + vec2<i32>(offset);
@@ -135,7 +162,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
         let history = unpack_history(textureLoad(in_history, texel, 0));
         let radiance = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
         let l = luminance(radiance);
-        let kept = radiance * (1.0 - sharp + sharp * min(1.0, glint / l));
+        let kept = radiance * min(1.0, glint / l);
         let rho = offset.x * rho_x + offset.y * rho_y;
         let apart = (history.share - own.share) * (1.0 / SHARE_TOLERANCE);
         let brighter = brightness(radiance) - own_brightness;
@@ -143,7 +170,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
             + noise_falloff * brighter * brighter;
         // Without a length it is what `fill` left in a tile in which the guide may say anything.
         let counts = tap.denoised && history.length > 0.0 && all(at == texel) && any(at != vec2<i32>(pixel));
-        let w = select(0.0, trust(history.length) * exp(-penalty), counts);
+        let w = select(0.0, trust(history.length) * (exp(-penalty * difference) + least_fit), counts);
         sum += vec4<f32>(select(vec3<f32>(0.0), kept, counts), 1.0) * w;
         let counted = select(0.0, l, counts);
         next = max(next, min(brightest, counted));
@@ -152,7 +179,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     // What stands out alone, or in a pair, has to last: above the other taps it counts as so many times as bright as
     // frames saw it.
     let limit = min(1.0, own.length * next / luminance(own_radiance));
-    let alone = select(1.0, limit, next > 0.0 && guide.roughness >= OUTLIER_ROUGHNESS);
+    let alone = select(1.0, limit, next > 0.0 && is_noisy);
     sum += vec4<f32>(own_radiance * alone, 1.0) * trust(own.length);
     let near = sum.rgb / sum.a;
     return vec4<f32>(blend(near, wide.radiance, by_blocks), wide.variance);

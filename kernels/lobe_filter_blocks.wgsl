@@ -20,6 +20,6 @@ fn lobe_filter_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_in
     let pixel = place * BLOCK_SIZE + position_in_block(lane);
     let guide = load_guide(pixel);
     let own = unpack_block(textureLoad(in_blocks, place, 0));
-    let wide = blocks_around(pixel, plane_of(guide, world_position(pixel, guide.depth)), own.share);
+    let wide = blocks_around(pixel, pixel_plane_of(guide, world_position(pixel, guide.depth)), own.share);
     store_result(pixel, guide, without_exposure(vec4<f32>(wide.radiance, wide.variance)));
 }
