@@ -24,6 +24,7 @@ import package::shared::packing;
 import package::shared::gbuffer;
 import package::shared::radiance;
 import package::shared::outliers;
+import package::shared::listed;
 import package::shared::tiles;
 import package::shared::footprint;
 import package::shared::history;
@@ -47,9 +48,6 @@ override OUTLIER_SPREAD: bool = true;
 // There are blocks of this frame's input to compare with.
 override BLOCK_STATISTICS: bool = true;
 
-// Whole blocks have a pass of their own, and the list of blocks holds the others.
-override WHOLE_BLOCKS: bool = false;
-
 @group(0) @binding(5) var in_motion: texture_2d<f32>;
 @group(0) @binding(7) var in_hit_motion: texture_2d<f32>;
 
@@ -58,11 +56,7 @@ override WHOLE_BLOCKS: bool = false;
 @group(1) @binding(3) var in_blocks: texture_2d<u32>;
 @group(1) @binding(4) var in_samples: texture_2d<u32>;
 @group(1) @binding(5) var in_light: texture_2d<u32>;
-@group(1) @binding(6) var<storage, read> in_tiles: array<u32>;
-@group(1) @binding(7) var<storage, read> in_args: array<vec4<u32>, 4>;
-@group(1) @binding(8) var out_history: texture_storage_2d<rgba16float, write>;
-@group(1) @binding(9) var<storage, read> in_block_list: array<u32>;
-@group(1) @binding(10) var<storage, read> in_block_args: array<vec4<u32>, 3>;
+@group(1) @binding(6) var out_history: texture_storage_2d<rgba16float, write>;
 
 // Share of the blocks around a pixel that has to show its surface.
 const FIT: f32 = 0.2;
@@ -451,20 +445,7 @@ fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
 
 @compute @workgroup_size(8, 8)
 fn accumulate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    var pixel: vec2<u32>;
-    if WHOLE_BLOCKS {
-        let index = listed_block_index(group, lane);
-        if index >= in_block_args[0].w {
-            return;
-        }
-        pixel = unpack_tile(in_block_list[index]) * BLOCK_SIZE + position_in_block(lane);
-    } else {
-        let index = list_index(group);
-        if index >= in_args[0].w {
-            return;
-        }
-        pixel = unpack_tile(in_tiles[index]) * TILE_SIZE + lane_position(lane);
-    }
+    let pixel = listed_pixel(group, lane);
     if any(pixel >= frame.size) {
         return;
     }

@@ -18,6 +18,7 @@ import package::shared::frame;
 import package::shared::packing;
 import package::shared::gbuffer;
 import package::shared::radiance;
+import package::shared::listed;
 import package::shared::tiles;
 import package::shared::footprint;
 import package::shared::outliers;
@@ -29,17 +30,11 @@ import package::shared::fallback;
 override NEAR_TAPS: u32 = 12u;
 // There are filtered blocks.
 override WIDE_FILTER: bool = true;
-// Whole blocks have a pass of their own, and the list of blocks holds the others.
-override WHOLE_BLOCKS: bool = false;
 
 @group(1) @binding(2) var in_history: texture_2d<f32>;
 @group(1) @binding(3) var in_blocks: texture_2d<u32>;
-@group(1) @binding(4) var<storage, read> in_tiles: array<u32>;
-@group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 4>;
-@group(1) @binding(6) var out_output: texture_storage_2d<rgba16float, write>;
-@group(1) @binding(7) var out_prev_guide: texture_storage_2d<r32uint, write>;
-@group(1) @binding(8) var<storage, read> in_block_list: array<u32>;
-@group(1) @binding(9) var<storage, read> in_block_args: array<vec4<u32>, 3>;
+@group(1) @binding(4) var out_output: texture_storage_2d<rgba16float, write>;
+@group(1) @binding(5) var out_prev_guide: texture_storage_2d<r32uint, write>;
 
 // Least half axes, in pixels, over which the weight of near taps falls.
 const NEAR_LEAST: f32 = 1.7;
@@ -199,20 +194,7 @@ fn store_result(pixel: vec2<u32>, guide: Guide, result: vec4<f32>) {
 
 @compute @workgroup_size(8, 8)
 fn lobe_filter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    var pixel: vec2<u32>;
-    if WHOLE_BLOCKS {
-        let index = listed_block_index(group, lane);
-        if index >= in_block_args[0].w {
-            return;
-        }
-        pixel = unpack_tile(in_block_list[index]) * BLOCK_SIZE + position_in_block(lane);
-    } else {
-        let index = list_index(group);
-        if index >= in_args[0].w {
-            return;
-        }
-        pixel = unpack_tile(in_tiles[index]) * TILE_SIZE + lane_position(lane);
-    }
+    let pixel = listed_pixel(group, lane);
     if any(pixel >= frame.size) {
         return;
     }

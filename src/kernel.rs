@@ -47,6 +47,7 @@ const SOURCES: &[(&str, &str)] = sources![
     "shared/gbuffer",
     "shared/history",
     "shared/light",
+    "shared/listed",
     "shared/neighborhood",
     "shared/outliers",
     "shared/packing",
