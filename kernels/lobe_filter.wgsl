@@ -42,9 +42,10 @@ const NEAR_LEAST: f32 = 1.7;
 const NEAR_MOST: f32 = 3.0;
 const NEAR_LEAST_REACH: f32 = 1.4;
 const REACH_OF_TAP: f32 = 0.05;
-// The variance of what was accumulated for few frames is high and the filter may err more: differences count for a
-// share of what they do, for a frame and for each one more. Whatever fits no tap takes a little of all.
-const YOUNG_DIFFERENCE: f32 = 0.3;
+// The variance of what was accumulated for few frames is high and taps may fit worse: differences count for a share of
+// what they do, for a frame and for each one more, and what fits no tap takes a little of all. How far the filter reaches
+// does not depend on frames.
+const YOUNG_DIFFERENCE: f32 = 0.2;
 const DIFFERENCE_OF_FRAME: f32 = 0.1;
 const YOUNG_FIT: f32 = 0.05;
 // As `NORMAL_TOLERANCE` between single pixels.
@@ -161,11 +162,11 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
         let rho = offset.x * rho_x + offset.y * rho_y;
         let apart = (history.share - own.share) * (1.0 / SHARE_TOLERANCE);
         let brighter = brightness(radiance) - own_brightness;
-        let penalty = plane_penalty(plane, tap, vec2<f32>(texel) + 0.5) + dot(rho, rho) + apart * apart
-            + noise_falloff * brighter * brighter;
+        let penalty = plane_penalty(plane, tap, vec2<f32>(texel) + 0.5) + apart * apart + noise_falloff * brighter * brighter;
         // Without a length it is what `fill` left in a tile in which the guide may say anything.
         let counts = tap.denoised && history.length > 0.0 && all(at == texel) && any(at != vec2<i32>(pixel));
-        let w = select(0.0, trust(history.length) * (exp(-penalty * difference) + least_fit), counts);
+        let fit = exp(-penalty * difference) + least_fit;
+        let w = select(0.0, trust(history.length) * exp(-dot(rho, rho)) * fit, counts);
         sum += vec4<f32>(select(vec3<f32>(0.0), kept, counts), 1.0) * w;
         let counted = select(0.0, l, counts);
         next = max(next, min(brightest, counted));
