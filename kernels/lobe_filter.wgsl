@@ -118,7 +118,6 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let plane = pixel_plane_of(guide, position);
     let footprint = lobe_footprint(position, guide, own.share);
     let radius = vec2<f32>(footprint.along, footprint.across) * frame.filter_scale;
-    let side = side_of(footprint.axis);
     var wide: Wide;
     if WIDE_FILTER {
         wide = blocks_around(pixel, plane, own.share);
@@ -129,14 +128,16 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let is_noisy = guide.roughness >= OUTLIER_ROUGHNESS;
     let difference = select(1.0, min(1.0, YOUNG_DIFFERENCE + DIFFERENCE_OF_FRAME * (own.length - 1.0)), is_noisy);
     let least_fit = select(0.0, YOUNG_FIT / (own.length * own.length), is_noisy);
-    let axis = radius.x * (1.0 / GLINT_AXIS);
-    let glint = (GLINT_LIMIT * luminance(own_radiance) + GLINT_FLOOR) * max(1.0, axis * axis)
+    let glint_axes = radius.x * (1.0 / GLINT_AXIS);
+    let glint = (GLINT_LIMIT * luminance(own_radiance) + GLINT_FLOOR) * max(1.0, glint_axes * glint_axes)
         * max(1.0, GLINT_FRAMES / own.length);
     let own_brightness = brightness(own_radiance);
     let least_reach = NEAR_LEAST_REACH + REACH_OF_TAP * f32(NEAR_TAPS);
-    let reach = clamp(radius, vec2<f32>(least_reach), vec2<f32>(NEAR_MOST)) * inverseSqrt(max(f32(NEAR_TAPS), 1.0));
+    // A disk, of which weights make an ellipse: no axis decides between two pixels.
+    let reach = clamp(radius.x, least_reach, NEAR_MOST) * inverseSqrt(max(f32(NEAR_TAPS), 1.0));
     // From pixels to half axes.
     let falloff = 1.0 / max(radius, vec2<f32>(NEAR_LEAST));
+    let side = side_of(footprint.axis);
     let rho_x = vec2<f32>(footprint.axis.x, side.x) * falloff;
     let rho_y = vec2<f32>(footprint.axis.y, side.y) * falloff;
     var direction = vec2<f32>(1.0, 0.0);
@@ -149,9 +150,8 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     var brightest = 0.0;
     var next = 0.0;
     for (var i = 0u; i < taps; i++) {
-        let point = direction * (reach * sqrt(f32(i) + 1.0));
+        let offset = round(direction * (reach * sqrt(f32(i) + 1.0)));
         direction = turned(direction);
-        let offset = round(footprint.axis * point.x + side * point.y);
         let at = vec2<i32>(pixel) + vec2<i32>(offset);
         let texel = clamp(at, vec2<i32>(0), vec2<i32>(frame.size) - 1);
         let tap = load_guide(vec2<u32>(texel));
