@@ -11,8 +11,8 @@
 //!
 //! Grid: one workgroup per listed tile or four listed blocks (indirect). Loads 4 blocks, and a history and a guide for
 //! each near tap.
-//! Weights depend on the surface, on hit distance and on how settled a tap is; on colour for mirrors only: elsewhere
-//! that would darken, as bright samples are rare.
+//! Weights depend on the surface, on hit distance and on how settled tap and pixel are; on colour for mirrors only, as
+//! elsewhere bright samples are rare and that would darken.
 
 import package::shared::frame;
 import package::shared::packing;
@@ -132,7 +132,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let glint = (GLINT_LIMIT * luminance(own_radiance) + GLINT_FLOOR) * max(1.0, glint_axes * glint_axes)
         * max(1.0, GLINT_FRAMES / own.length);
     let own_brightness = brightness(own_radiance);
-    let least_reach = NEAR_LEAST_REACH + REACH_OF_TAP * f32(NEAR_TAPS);
+    let least_reach = min(NEAR_LEAST_REACH + REACH_OF_TAP * f32(NEAR_TAPS), NEAR_MOST);
     // A disk, of which weights make an ellipse: no axis decides between two pixels.
     let reach = clamp(radius.x, least_reach, NEAR_MOST) * inverseSqrt(max(f32(NEAR_TAPS), 1.0));
     // From pixels to half axes.
