@@ -9,7 +9,7 @@
 //!                                       when ACCUMULATED)
 //!
 //! Grid: one invocation a block, workgroups of the blocks of 16 listed tiles (indirect).
-//! Each pixel is read twice.
+//! Each pixel is read once, the one in the middle twice.
 //! After: outliers are set aside, not lost, as in DeCoro et al. 2010; here their excess is spread by `block_spread`
 //! and comes back in `accumulate`.
 
@@ -41,52 +41,44 @@ override SAMPLES_ARE_USED: bool = false;
 // Weight that the surface of the least fitting pixel of a whole block has.
 const WHOLE_WEIGHT: f32 = 0.37;
 
-// What stands for a block.
-struct Choice {
-    guide: Guide,
-    pixel: vec2<u32>,
-    // The three largest luminances of its samples.
-    peaks: vec3<f32>,
-}
+// Pixels of a block, from its centre outwards: a digit is a pixel's place in its row, and four times that row.
+const FROM_CENTER: array<u32, 2> = array<u32, 2>(0x2184a695u, 0xf3c0b7edu);
 
 // Pixels of a block on screen.
 fn pixel_count(corner: vec2<u32>) -> vec2<u32> {
     return min(frame.size - corner, vec2<u32>(BLOCK_SIZE));
 }
 
-// The denoised pixel nearest to the centre of a block.
-fn choose(corner: vec2<u32>) -> Choice {
-    var choice: Choice;
-    var nearest = 1e9;
-    var count = 0u;
-    let size = pixel_count(corner);
-    for (var i = 0u; i < 4u * size.y; i++) {
-        let pixel = corner + vec2<u32>(i & 3u, i >> 2u);
-        if (i & 3u) >= size.x {
-            continue;
-        }
-        let denoised = is_denoised(pixel);
-        // A little off the centre, so that no two are as near.
-        let offset = vec2<f32>(pixel - corner) - vec2<f32>(1.4, 1.45);
-        let distance = dot(offset, offset);
-        if denoised && distance < nearest {
-            nearest = distance;
-            choice.pixel = pixel;
-        }
-        count += select(0u, 1u, denoised);
-        if !ACCUMULATED {
-            let l = select(0.0, luminance(load_radiance(pixel)), denoised);
-            let p = choice.peaks;
-            choice.peaks = vec3<f32>(max(p.x, l), max(p.y, min(p.x, l)), max(p.z, min(p.y, l)));
+// The denoised pixel nearest to the centre of a block, which stands for it; some other one where none is.
+fn central_pixel(corner: vec2<u32>) -> vec2<u32> {
+    var pixel = corner;
+    for (var i = 0u; i < 16u; i++) {
+        let place = (FROM_CENTER[i >> 3u] >> (4u * (i & 7u))) & 15u;
+        pixel = min(corner + vec2<u32>(place & 3u, place >> 2u), frame.size - 1u);
+        if is_denoised(pixel) {
+            break;
         }
     }
-    if count > 0u {
-        choice.guide = load_guide(choice.pixel);
-    }
-    // A sample on its own is above no other.
-    choice.peaks.y = select(choice.peaks.y, choice.peaks.x, count < 2u);
-    choice.peaks.z = select(choice.peaks.z, choice.peaks.y, count < 3u);
-    return choice;
+    return pixel;
+}
+
+struct Sample {
+    radiance: vec3<f32>,
+    luminance: f32,
+    weight: f32,
+}
+
+// Over the samples of a block.
+struct Sums {
+    // a: weight.
+    radiance: vec4<f32>,
+    // Of brightness.
+    moments: vec2<f32>,
+}
+
+fn with_sample(sums: Sums, radiance: vec3<f32>, weight: f32) -> Sums {
+    let b = brightness(radiance);
+    return Sums(sums.radiance + vec4<f32>(radiance, 1.0) * weight, sums.moments + vec2<f32>(b, b * b) * weight);
 }
 
 @compute @workgroup_size(64)
@@ -100,21 +92,24 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
         return;
     }
     let corner = block_index * BLOCK_SIZE;
-    let choice = choose(corner);
-    if !choice.guide.denoised {
+    let central = central_pixel(corner);
+    let surface = load_guide(central);
+    if !surface.denoised {
         textureStore(out_blocks, block_index, vec4<u32>(0u));
         return;
     }
-    let position = world_position(choice.pixel, choice.guide.depth);
+    let position = world_position(central, surface.depth);
     let camera_distance = camera_distance_of(position);
-    let plane = plane_of(choice.guide, position);
-    // a: weight.
-    var radiance = vec4<f32>(0.0);
-    var excess = vec3<f32>(0.0);
+    let plane = plane_of(surface, position);
+    var sums: Sums;
+    // The brightest sample is not in the sums until it is known whether it is an outlier.
+    var brightest: Sample;
+    // The next largest luminances.
+    var next = vec2<f32>(0.0);
+    var count = 0u;
     // x: weighted sum, y: weight of those that know.
     var share = vec2<f32>(0.0);
     var noise = vec2<f32>(0.0);
-    var moments = vec2<f32>(0.0);
     var squared_weight = 0.0;
     var least_weight = 1.0;
     let size = pixel_count(corner);
@@ -125,34 +120,51 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
         }
         let guide = load_guide(pixel);
         let w = select(0.0, exp(-plane_penalty(plane, guide, vec2<f32>(pixel) + 0.5)), guide.denoised);
-        var c = vec3<f32>(0.0);
         if ACCUMULATED {
             let history = unpack_history(textureLoad(in_history, pixel, 0));
-            c = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
+            let c = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
+            sums = with_sample(sums, select(vec3<f32>(0.0), c, guide.denoised), w);
             share += select(vec2<f32>(0.0), vec2<f32>(history.share, 1.0) * w, guide.denoised);
             noise += select(vec2<f32>(0.0), vec2<f32>(history.noise, 1.0) * w, guide.denoised && history.noise >= 0.0);
         } else {
-            c = load_radiance(pixel);
-            let distance = usable_hit_distance(textureLoad(in_radiance, pixel, 0).a);
+            let texel = textureLoad(in_radiance, pixel, 0);
+            let c = select(vec3<f32>(0.0), clean_radiance(texel.rgb * frame.exposure), guide.denoised);
+            let sample = Sample(c, select(0.0, luminance(c), guide.denoised), w);
+            let is_brighter = sample.luminance > brightest.luminance;
+            let darker = min(sample.luminance, brightest.luminance);
+            next = vec2<f32>(max(next.x, darker), max(next.y, min(next.x, darker)));
+            sums = with_sample(
+                sums,
+                select(sample.radiance, brightest.radiance, is_brighter),
+                select(sample.weight, brightest.weight, is_brighter),
+            );
+            brightest.radiance = select(brightest.radiance, sample.radiance, is_brighter);
+            brightest.weight = select(brightest.weight, sample.weight, is_brighter);
+            brightest.luminance = max(brightest.luminance, sample.luminance);
+            let distance = usable_hit_distance(texel.a);
             share += select(vec2<f32>(0.0), vec2<f32>(hit_share(distance, camera_distance), 1.0) * w, distance > 0.0);
-            if OUTLIER_SPREAD {
-                let kept = without_outlier(c, choice.peaks.y, choice.guide.roughness);
-                excess += select(vec3<f32>(0.0), (c - kept) * w, guide.denoised);
-                c = kept;
-            }
+            count += select(0u, 1u, guide.denoised);
         }
-        c = select(vec3<f32>(0.0), c, guide.denoised);
-        radiance += vec4<f32>(c, 1.0) * w;
-        let b = brightness(c);
-        moments += vec2<f32>(b, b * b) * w;
         squared_weight += w * w;
         least_weight = min(least_weight, w);
     }
-    let normalization = 1.0 / max(radiance.w, 1e-6);
-    moments *= normalization;
+    // A sample on its own is above no other.
+    next.x = select(next.x, brightest.luminance, count < 2u);
+    next.y = select(next.y, next.x, count < 3u);
+    var excess = vec3<f32>(0.0);
+    if !ACCUMULATED {
+        var kept = brightest.radiance;
+        if OUTLIER_SPREAD {
+            kept = without_outlier(brightest.radiance, next.x, surface.roughness);
+            excess = (brightest.radiance - kept) * brightest.weight;
+        }
+        sums = with_sample(sums, kept, brightest.weight);
+    }
+    let normalization = 1.0 / max(sums.radiance.w, 1e-6);
+    let moments = sums.moments * normalization;
     var block: Block;
-    block.guide = choice.guide;
-    block.radiance = radiance.rgb * normalization;
+    block.guide = surface;
+    block.radiance = sums.radiance.rgb * normalization;
     block.excess = excess * normalization;
     // Weights next to nothing say nothing, and some devices round them to 0.
     block.share = select(0.5, share.x / max(share.y, 1e-6), share.y > 1e-6);
@@ -166,7 +178,7 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
         block.is_whole = least_weight >= WHOLE_WEIGHT && all(size == vec2<u32>(BLOCK_SIZE));
     }
     if SAMPLES_ARE_USED {
-        let peaks = min(vec2<f32>(choice.peaks.y, choice.peaks.z), vec2<f32>(HALF_MAX));
+        let peaks = min(next, vec2<f32>(HALF_MAX));
         let brightness_and_weight = vec2<f32>(moments.x, squared_weight * normalization * normalization);
         textureStore(out_samples, block_index, vec4<u32>(pack2x16float(peaks), pack2x16float(brightness_and_weight), 0u, 0u));
     }
