@@ -19,7 +19,7 @@ fn grid_of(length: u32, per_group: u32) -> vec4<u32> {
 @compute @workgroup_size(1)
 fn block_args() {
     out_block_args[0] = grid_of(inout_block_counters[0], BLOCKS_PER_GROUP);
-    out_block_args[1] = grid_of(inout_block_counters[1], BLOCKS_PER_GROUP);
+    out_block_args[1] = grid_of(inout_block_counters[1], 16u);
     out_block_args[2] = grid_of(inout_block_counters[1], 64u);
     inout_block_counters[0] = 0u;
     inout_block_counters[1] = 0u;

@@ -76,21 +76,35 @@ struct Wide {
     variance: f32,
 }
 
+// One of them.
+struct BlockTap {
+    // Radiance, and 1, times how well the block fits.
+    fitting: vec4<f32>,
+    variance: f32,
+}
+
+fn block_tap(block: vec2<i32>, plane: Plane, own_share: f32) -> BlockTap {
+    let tap = unpack_block(textureLoad(in_blocks, block, 0));
+    let apart = (tap.share - own_share) * (1.0 / WIDE_SHARE);
+    let penalty = plane_penalty(plane, tap.guide, block_place(block)) + apart * apart;
+    let fit = select(0.0, exp(-penalty), tap.guide.denoised);
+    return BlockTap(vec4<f32>(tap.radiance, 1.0) * fit, select(0.0, tap.deviation * tap.deviation, tap.guide.denoised));
+}
+
+fn wide_of(fitting: vec4<f32>, variance: f32) -> Wide {
+    return Wide(fitting.rgb / max(fitting.a, 1e-6), fitting.a, variance);
+}
+
 fn blocks_around(pixel: vec2<u32>, plane: Plane, own_share: f32) -> Wide {
-    var sum: Wide;
+    var fitting = vec4<f32>(0.0);
+    var variance = 0.0;
     for (var i = 0u; i < 4u; i++) {
         let corner = corner_of(pixel, i);
-        let tap = unpack_block(textureLoad(in_blocks, corner.block, 0));
-        let share = select(0.0, corner.weight, tap.guide.denoised);
-        let apart = (tap.share - own_share) * (1.0 / WIDE_SHARE);
-        let penalty = plane_penalty(plane, tap.guide, block_place(corner.block)) + apart * apart;
-        let w = select(0.0, corner.weight * exp(-penalty), tap.guide.denoised);
-        sum.radiance += w * tap.radiance;
-        sum.fit += w;
-        sum.variance += share * tap.deviation * tap.deviation;
+        let tap = block_tap(corner.block, plane, own_share);
+        fitting += tap.fitting * corner.weight;
+        variance += tap.variance * corner.weight;
     }
-    sum.radiance *= 1.0 / max(sum.fit, 1e-6);
-    return sum;
+    return wide_of(fitting, variance);
 }
 
 // Trust in what has been accumulated for few frames.

@@ -6,20 +6,43 @@
 //! out  output            rgba16float   full    rgb: denoised radiance; a: variance of its brightness, 0..1
 //! out  prev_guide        r32uint       full    what the next frame wants to know of the G-buffer (G-buffer copy)
 //!
-//! Grid: one workgroup per four listed blocks (indirect). Loads 5 blocks.
+//! Grid: an invocation for each 2x2 pixels, which are between the same blocks; one workgroup per 16 listed blocks
+//! (indirect). Loads 5 blocks, 4 guides.
 
 import package::lobe_filter;
 
-@compute @workgroup_size(8, 8)
+@compute @workgroup_size(64)
 fn lobe_filter_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let index = listed_block_index(group, lane);
+    let index = list_index(group) * 16u + lane / 4u;
     if index >= in_block_args[1].w {
         return;
     }
     let place = unpack_tile(in_block_list[block_count() - 1u - index]);
-    let pixel = place * BLOCK_SIZE + position_in_block(lane);
-    let guide = load_guide(pixel);
     let own = unpack_block(textureLoad(in_blocks, place, 0));
-    let wide = blocks_around(pixel, pixel_plane_of(guide, world_position(pixel, guide.depth)), own.share);
-    store_result(pixel, guide, without_exposure(vec4<f32>(wide.radiance, wide.variance)));
+    let quadrant = vec2<u32>(lane & 1u, (lane >> 1u) & 1u);
+    let first = place * BLOCK_SIZE + quadrant * 2u;
+    // The surface next to the other blocks: what they are to it, it is to them.
+    let outer = place * BLOCK_SIZE + quadrant * 3u;
+    let guide = load_guide(outer);
+    let plane = pixel_plane_of(guide, world_position(outer, guide.depth));
+    let top_left = block_tap(corner_of(first, 0u).block, plane, own.share);
+    let top_right = block_tap(corner_of(first, 1u).block, plane, own.share);
+    let bottom_left = block_tap(corner_of(first, 2u).block, plane, own.share);
+    let bottom_right = block_tap(corner_of(first, 3u).block, plane, own.share);
+    for (var i = 0u; i < 4u; i++) {
+        let pixel = first + vec2<u32>(i & 1u, i >> 1u);
+        let across = between_blocks(pixel).fraction;
+        let fitting = mix(
+            mix(top_left.fitting, top_right.fitting, across.x),
+            mix(bottom_left.fitting, bottom_right.fitting, across.x),
+            across.y,
+        );
+        let variance = mix(
+            mix(top_left.variance, top_right.variance, across.x),
+            mix(bottom_left.variance, bottom_right.variance, across.x),
+            across.y,
+        );
+        let wide = wide_of(fitting, variance);
+        store_result(pixel, load_guide(pixel), without_exposure(vec4<f32>(wide.radiance, wide.variance)));
+    }
 }

@@ -87,6 +87,18 @@ fn block_place(block: vec2<i32>) -> vec2<f32> {
     return min(vec2<f32>(block * i32(BLOCK_SIZE)) + 1.5, vec2<f32>(frame.size) - 0.5);
 }
 
+// Where a pixel lies between four blocks: the first of them, which may be off screen, and how far from it to the last.
+struct BetweenBlocks {
+    first: vec2<i32>,
+    fraction: vec2<f32>,
+}
+
+fn between_blocks(pixel: vec2<u32>) -> BetweenBlocks {
+    let place = (vec2<f32>(pixel) + 0.5) / f32(BLOCK_SIZE) - 0.5;
+    let first = floor(place);
+    return BetweenBlocks(vec2<i32>(first), place - first);
+}
+
 // One of the four blocks around a pixel.
 struct Corner {
     block: vec2<i32>,
@@ -95,11 +107,10 @@ struct Corner {
 }
 
 fn corner_of(pixel: vec2<u32>, corner: u32) -> Corner {
-    let place = (vec2<f32>(pixel) + 0.5) / f32(BLOCK_SIZE) - 0.5;
-    let base = floor(place);
+    let between = between_blocks(pixel);
     let offset = vec2<u32>(corner & 1u, corner >> 1u);
-    let weight = select(1.0 - (place - base), place - base, offset == vec2<u32>(1u));
-    return Corner(clamp(vec2<i32>(base) + vec2<i32>(offset), vec2<i32>(0), last_block()), weight.x * weight.y);
+    let weight = select(1.0 - between.fraction, between.fraction, offset == vec2<u32>(1u));
+    return Corner(clamp(between.first + vec2<i32>(offset), vec2<i32>(0), last_block()), weight.x * weight.y);
 }
 
 // Luminance squeezed into 0 to 1, in which differences and deviations are measured.
