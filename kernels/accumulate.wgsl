@@ -13,8 +13,8 @@
 //! in   tiles, args   lists                tiles to denoise, or blocks (whole blocks)
 //! out  history       rgba16float  full    accumulated radiance, its length, noise and hit share
 //!
-//! Grid: one workgroup per listed tile or four listed blocks (indirect). Loads 4 blocks, 8 guides, 8 histories (one
-//! history: 4 and 4), 9 radiances at most.
+//! Grid: one workgroup per listed tile or four listed blocks (indirect). Loads 4 blocks (without
+//! interpolation 1), 8 guides, 8 histories (one history: 4 and 4), 9 radiances at most.
 //! After: accumulation as in Schied et al. 2017 (SVGF); reflected points after Lagarde and de Rousiers 2014 (dominant
 //! direction of the lobe). The two candidates are mixed by how well each fits the blocks of this frame; how far they
 //! lie apart, against the footprint, bounds what history is worth.
@@ -47,6 +47,8 @@ override LIGHT_CHANGE: bool = true;
 override OUTLIER_SPREAD: bool = true;
 // There are blocks of this frame's input to compare with.
 override BLOCK_STATISTICS: bool = true;
+// How many of those around a pixel: all 4, or 1, the one it is in.
+override BLOCK_TAPS: u32 = 4u;
 
 @group(0) @binding(5) var in_motion: texture_2d<f32>;
 @group(0) @binding(7) var in_hit_motion: texture_2d<f32>;
@@ -98,8 +100,11 @@ struct Surroundings {
 fn surroundings_of(pixel: vec2<u32>, plane: Plane) -> Surroundings {
     var sum: Surroundings;
     var weight = 1e-6;
-    for (var i = 0u; i < 4u; i++) {
-        let corner = corner_of(pixel, i);
+    for (var i = 0u; i < BLOCK_TAPS; i++) {
+        var corner = Corner(vec2<i32>(pixel / BLOCK_SIZE), 1.0);
+        if BLOCK_TAPS == 4u {
+            corner = corner_of(pixel, i);
+        }
         let tap = unpack_block(textureLoad(in_blocks, corner.block, 0));
         // The least weights are for pixels whose surface no block shows.
         let fit = exp(-plane_penalty(plane, tap.guide, block_place(corner.block))) + 1e-5;

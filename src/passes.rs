@@ -337,6 +337,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             "LIGHT_CHANGE",
             "OUTLIER_SPREAD",
             "BLOCK_STATISTICS",
+            "BLOCK_TAPS",
             "WHOLE_BLOCKS",
         ],
         bindings: ACCUMULATE_BINDINGS,
@@ -354,6 +355,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             "HIT_MOTION",
             "LIGHT_CHANGE",
             "OUTLIER_SPREAD",
+            "BLOCK_TAPS",
         ],
         bindings: ACCUMULATE_BINDINGS,
     },
@@ -372,6 +374,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             "HIT_MOTION",
             "OUTLIER_SPREAD",
             "BLOCK_STATISTICS",
+            "BLOCK_TAPS",
         ],
         bindings: &[
             ("in_radiance", "radiance", Current),
@@ -568,6 +571,13 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         "LIGHT_CHANGE" => f64::from(features.light_change),
         "OUTLIER_SPREAD" => f64::from(features.outlier_spread),
         "BLOCK_STATISTICS" => f64::from(features.compares_with_blocks()),
+        "BLOCK_TAPS" => {
+            if features.block_interpolation {
+                4.0
+            } else {
+                1.0
+            }
+        }
         "SAMPLES_ARE_USED" => f64::from(features.light_change || features.outlier_spread),
         "NEAR_TAPS" => f64::from(if features.spatial_filter { features.near_taps } else { 0 }),
         "WIDE_TAPS" => f64::from(features.wide_taps),

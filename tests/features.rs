@@ -38,9 +38,10 @@ fn off(pipeline: Pipeline) -> Vec<(&'static str, Change)> {
         ("edge_repair", |features| features.edge_repair = false),
         ("average_mixing", |features| features.average_mixing = false),
     ];
-    let footprint: [(&str, Change); 9] = [
+    let footprint: [(&str, Change); 10] = [
         ("whole_blocks", |features| features.whole_blocks = false),
         ("both_histories", |features| features.both_histories = false),
+        ("block_interpolation", |features| features.block_interpolation = false),
         ("hit_motion", |features| features.hit_motion = false),
         ("light_change", |features| features.light_change = false),
         ("outlier_spread", |features| features.outlier_spread = false),

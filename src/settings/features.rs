@@ -47,6 +47,9 @@ pub struct Features {
     /// hit distances from there where single ones say little. Mirrors, whose samples hold no noise, need none. Only
     /// without `outlier_spread` too is it left out, which needs them.
     pub block_statistics: bool,
+    /// Footprint pipeline: compares with all four blocks around a pixel, by how near they are. Without it with the one that
+    /// the pixel is in: edges of blocks may show where outliers are spread over footprints narrower than blocks.
+    pub block_interpolation: bool,
     /// Footprint pipeline: filters over blocks where the footprint is wider than a few pixels. A scene of smooth
     /// surfaces has no such footprints.
     pub wide_filter: bool,
@@ -91,6 +94,7 @@ impl Default for Features {
             light_change: true,
             outlier_spread: true,
             block_statistics: true,
+            block_interpolation: true,
             wide_filter: true,
             near_taps: 12,
             wide_taps: 4,

@@ -40,6 +40,7 @@ impl Preset {
                 settings.features.near_taps = 4;
                 settings.features.wide_taps = 2;
                 settings.features.both_histories = false;
+                settings.features.block_interpolation = false;
                 settings
             }
             Preset::Reference => {

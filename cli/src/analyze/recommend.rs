@@ -250,8 +250,9 @@ fn published(needs: &Needs, settings: &Settings) -> Vec<Change> {
 /// What else could be left out of settings: whether a sequence misses it can only be measured. Of several values of one
 /// setting the leanest comes first.
 pub fn untried(settings: &Settings, recommended: &[Change]) -> Vec<Change> {
-    const FEATURES: [&str; 10] = [
+    const FEATURES: [&str; 11] = [
         "both_histories",
+        "block_interpolation",
         "spatial_filter",
         "wide_filter",
         "outlier_spread",

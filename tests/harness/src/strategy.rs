@@ -304,7 +304,7 @@ fn number_value(number: &'static Number) -> impl Strategy<Value = f32> {
 pub fn any_features() -> impl Strategy<Value = Features> {
     let roughness = prop::option::of(select(&[0.0f32, 0.01, 0.447_213_6, 1.0][..]));
     let taps = (select(&[0u32, 1, 4, 12][..]), select(&[1u32, 2, 4, 7][..]));
-    (prop::array::uniform17(any::<bool>()), taps, roughness).prop_map(|(on, taps, constant_roughness)| {
+    (prop::array::uniform18(any::<bool>()), taps, roughness).prop_map(|(on, taps, constant_roughness)| {
         let mut features = Features::default();
         // One of the two has to be on.
         (features.mirror_parallax, features.surface_motion) = (on[0] || !on[1], on[1]);
@@ -314,6 +314,7 @@ pub fn any_features() -> impl Strategy<Value = Features> {
         (features.gbuffer_copy, features.packed_guide, features.block_statistics) = (on[10], on[11], on[12]);
         features.hit_motion = on[13];
         (features.both_histories, features.whole_blocks) = (on[15], on[16]);
+        features.block_interpolation = on[17];
         // Derived normals have to be kept.
         features.normal_input = on[14] || !(features.gbuffer_copy && features.packed_guide);
         ((features.near_taps, features.wide_taps), features.constant_roughness) = (taps, constant_roughness);
