@@ -200,10 +200,16 @@ fn without_exposure(filtered: vec4<f32>) -> vec4<f32> {
     return vec4<f32>(min(filtered.rgb * frame.inverse_exposure, vec3<f32>(HALF_MAX)), filtered.a);
 }
 
-fn store_result(pixel: vec2<u32>, guide: Guide, result: vec4<f32>) {
+fn store_result(pixel: vec2<u32>, result: vec4<f32>) {
     textureStore(out_output, pixel, rounded_to_half(result));
     if GBUFFER_IS_COPIED {
-        textureStore(out_prev_guide, pixel, vec4<u32>(pack_prev_guide(guide), 0u, 0u, 0u));
+        var word = 0u;
+        if GUIDE_IS_PACKED {
+            word = repack_prev_guide(textureLoad(in_guide, pixel, 0).xy);
+        } else {
+            word = pack_prev_guide(load_guide(pixel));
+        }
+        textureStore(out_prev_guide, pixel, vec4<u32>(word, 0u, 0u, 0u));
     }
 }
 
@@ -221,5 +227,5 @@ fn lobe_filter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     } else {
         result = vec4<f32>(fallback_radiance(pixel, guide), 0.0);
     }
-    store_result(pixel, guide, result);
+    store_result(pixel, result);
 }

@@ -44,6 +44,6 @@ fn lobe_filter_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_in
             across.y,
         );
         let wide = wide_of(fitting, variance);
-        store_result(pixel, load_guide(pixel), without_exposure(vec4<f32>(wide.radiance, wide.variance)));
+        store_result(pixel, without_exposure(vec4<f32>(wide.radiance, wide.variance)));
     }
 }

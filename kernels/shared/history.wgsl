@@ -48,13 +48,24 @@ fn unpack_history(texel: vec4<f32>) -> History {
 }
 
 // What is kept of last frame's G-buffer: 16 bits of depth, 12 of normal, 4 of roughness. 0 where nothing is denoised.
-fn pack_prev_guide(guide: Guide) -> u32 {
+// The normal is octahedral, 0 to 1.
+fn prev_guide_word(depth: f32, normal: vec2<f32>, roughness: f32, denoised: bool) -> u32 {
     // From 2^-31 to 2^31 units, 10 bits of mantissa, rounded.
-    let depth = clamp(guide.depth, 4.7e-10, 2.1e9);
-    let depth_word = ((bitcast<u32>(depth) + 0x1000u) >> 13u) - (95u << 10u);
-    let oct = vec2<u32>(round((oct_encode(guide.normal) * 0.5 + 0.5) * 63.0));
-    let roughness = u32(round(saturate(guide.roughness) * 15.0));
-    return select(0u, depth_word | (oct.x << 16u) | (oct.y << 22u) | (roughness << 28u), guide.denoised);
+    let depth_word = ((bitcast<u32>(clamp(depth, 4.7e-10, 2.1e9)) + 0x1000u) >> 13u) - (95u << 10u);
+    let oct = vec2<u32>(round(normal * 63.0));
+    let word = depth_word | (oct.x << 16u) | (oct.y << 22u) | (u32(round(roughness * 15.0)) << 28u);
+    return select(0u, word, denoised);
+}
+
+fn pack_prev_guide(guide: Guide) -> u32 {
+    return prev_guide_word(guide.depth, oct_encode(guide.normal) * 0.5 + 0.5, saturate(guide.roughness), guide.denoised);
+}
+
+// The same of a packed guide, without decoding it.
+fn repack_prev_guide(packed: vec2<u32>) -> u32 {
+    let depth = bitcast<f32>(packed.x);
+    let oct = vec2<f32>(vec2<u32>(packed.y, packed.y >> 11u) & vec2<u32>(2047u)) * (1.0 / 2047.0);
+    return prev_guide_word(abs(depth), oct, f32(packed.y >> 22u) * (1.0 / 1023.0), depth > 0.0);
 }
 
 fn unpack_prev_guide(word: u32) -> Guide {
