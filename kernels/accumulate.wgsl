@@ -450,7 +450,6 @@ fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
 
 @compute @workgroup_size(8, 8)
 fn accumulate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let pixel = listed_pixel(group, lane);
     if any(pixel >= frame.size) {
         return;

@@ -22,7 +22,6 @@ const BLOCK_PIXELS: u32 = 16u;
 
 @compute @workgroup_size(64)
 fn accumulate_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let index = list_index(group) * 64u + lane;
     if index >= in_block_args[2].w {
         return;

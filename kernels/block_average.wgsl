@@ -83,7 +83,6 @@ fn with_sample(sums: Sums, radiance: vec3<f32>, weight: f32) -> Sums {
 
 @compute @workgroup_size(64)
 fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let index = block_list_index(group, lane);
     if index >= in_args[0].w {
         return;

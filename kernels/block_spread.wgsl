@@ -25,7 +25,6 @@ override WIDE_TAPS: i32 = 4;
 
 @compute @workgroup_size(64)
 fn block_spread(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let index = block_list_index(group, lane);
     if index >= in_args[0].w {
         return;

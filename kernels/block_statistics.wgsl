@@ -62,7 +62,6 @@ fn known_light(block: vec2<i32>, position: vec3<f32>) -> Light {
 
 @compute @workgroup_size(64)
 fn block_statistics(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let index = block_list_index(group, lane);
     if index >= in_args[0].w {
         return;

@@ -162,7 +162,6 @@ fn list_rays(group: vec2<u32>, lane: u32) {
 
 @compute @workgroup_size(8, 8)
 fn classify(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     if lane == 0u {
         atomicStore(&listed_tiles, 0u);
         atomicStore(&ray_count, 0u);

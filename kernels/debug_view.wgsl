@@ -69,7 +69,6 @@ fn view_color(pixel: vec2<u32>, guide: Guide) -> vec3<f32> {
 
 @compute @workgroup_size(8, 8)
 fn debug_view(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let pixel = group.xy * TILE_SIZE + lane_position(lane);
     let on_screen = all(pixel < frame.size);
     var guide: Guide;

@@ -100,7 +100,6 @@ fn gather_neighborhood(tile: vec2<u32>, lane: u32) {
 
 @compute @workgroup_size(8, 8)
 fn debug_view_published(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let pixel = group.xy * TILE_SIZE + lane_position(lane);
     let on_screen = all(pixel < frame.size);
     var guide: Guide;

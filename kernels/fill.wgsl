@@ -55,7 +55,6 @@ fn entry_at(index: u32) -> u32 {
 
 @compute @workgroup_size(8, 8)
 fn fill(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let first = list_index(group) * TILES_PER_GROUP;
     let count = min(TILES_PER_GROUP, in_args[1].w - min(first, in_args[1].w));
     // A bit for each new tile.

@@ -40,7 +40,6 @@ fn is_filtered_whole(place: vec2<i32>) -> bool {
 
 @compute @workgroup_size(64)
 fn list_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     if lane < 2u {
         atomicStore(&group_counts[lane], 0u);
     }

@@ -58,7 +58,6 @@ fn clear_tile(tile: vec2<u32>) {
 
 @compute @workgroup_size(8, 8)
 fn list_tiles(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let tile = id.xy;
     let counts = tile_counts();
     let on_screen = all(tile < counts);

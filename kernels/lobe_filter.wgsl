@@ -215,7 +215,6 @@ fn store_result(pixel: vec2<u32>, result: vec4<f32>) {
 
 @compute @workgroup_size(8, 8)
 fn lobe_filter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let pixel = listed_pixel(group, lane);
     if any(pixel >= frame.size) {
         return;

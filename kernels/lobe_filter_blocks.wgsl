@@ -13,7 +13,6 @@ import package::lobe_filter;
 
 @compute @workgroup_size(64)
 fn lobe_filter_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let index = list_index(group) * 16u + lane / 4u;
     if index >= in_block_args[1].w {
         return;

@@ -107,7 +107,6 @@ fn prefilter_at(center: u32, average: vec3<f32>) -> vec4<f32> {
 
 @compute @workgroup_size(8, 8)
 fn prefilter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let index = list_index(group);
     if index >= in_args[0].w {
         return;

@@ -286,7 +286,6 @@ fn history_cap(alpha: f32) -> f32 {
 
 @compute @workgroup_size(8, 8)
 fn reproject(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let index = list_index(group);
     if index >= in_args[0].w {
         return;

@@ -81,7 +81,6 @@ fn resolve(pixel: vec2<u32>, lane: u32) -> vec4<f32> {
 
 @compute @workgroup_size(8, 8)
 fn resolve_temporal(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    frame = constants;
     let index = list_index(group);
     if index >= in_args[0].w {
         return;

@@ -208,7 +208,7 @@ pub struct Kernel {
     pub linked: Linked,
 }
 
-fn validator() -> Validator {
+pub(crate) fn validator() -> Validator {
     // pack2x16float is part of WebGPU, but not of naga's default.
     let capabilities = Capabilities::default() | Capabilities::SHADER_FLOAT16_IN_FLOAT32;
     Validator::new(ValidationFlags::all(), capabilities)

@@ -36,7 +36,7 @@ pub(crate) const EXPORTED: &[&str] = &[DEBUG_VIEW, "rays", "args"];
 
 /// What variables are that several kernels share.
 pub(crate) const SHARED_BINDINGS: &[(&str, &str, Copy)] = &[
-    ("constants", "frame", Current),
+    ("frame", "frame", Current),
     ("in_normal", "normal", Current),
     ("in_roughness", "roughness", Current),
     ("in_depth", "depth", Current),

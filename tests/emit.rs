@@ -78,6 +78,27 @@ proptest! {
 }
 
 #[test]
+fn spirv_reads_the_constant_buffer_once() {
+    let (_, kernels) = Plan::new(&Settings::default(), UVec2::new(64, 64)).unwrap();
+    for kernel in &kernels {
+        let module = kernel.module_for_spirv();
+        let buffers = |module: &naga::Module| -> Vec<_> {
+            let globals = module.global_variables.iter();
+            globals.filter(|(_, v)| v.space == naga::AddressSpace::Uniform).map(|(handle, _)| handle).collect()
+        };
+        assert_eq!(buffers(&module), buffers(&kernel.module), "{}", kernel.name);
+        let functions = module.functions.iter().map(|(_, function)| function);
+        let functions = functions.chain(module.entry_points.iter().map(|entry_point| &entry_point.function));
+        let expressions = functions.flat_map(|function| function.expressions.iter());
+        let uses = expressions.filter(
+            |(_, e)| matches!(e, naga::Expression::GlobalVariable(handle) if buffers(&module).contains(handle)),
+        );
+        assert_eq!(uses.count(), buffers(&module).len(), "{}", kernel.name);
+    }
+    assert!(kernels.iter().any(|kernel| kernel.bindings.iter().any(|binding| binding.name == "frame")));
+}
+
+#[test]
 fn comments_and_names_are_those_of_the_sources() {
     let (_, kernels) = Plan::new(&Preset::Reference.settings(), UVec2::new(64, 64)).unwrap();
     let prefilter = kernels.iter().find(|kernel| kernel.name == "prefilter").unwrap();

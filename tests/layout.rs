@@ -6,8 +6,7 @@ use limpid::kernel::{Kernel, Overrides};
 #[test]
 fn constants_have_the_layout_of_the_kernels() {
     let kernel = Kernel::new("reproject", &Overrides::new()).unwrap();
-    let (_, frame) =
-        kernel.module.global_variables.iter().find(|(_, v)| v.name.as_deref() == Some("constants")).unwrap();
+    let (_, frame) = kernel.module.global_variables.iter().find(|(_, v)| v.name.as_deref() == Some("frame")).unwrap();
     let naga::TypeInner::Struct { members, span } = &kernel.module.types[frame.ty].inner else {
         panic!("`frame` is no struct");
     };

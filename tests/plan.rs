@@ -83,7 +83,7 @@ proptest! {
         for pass in &plan.passes {
             // The least that WebGPU offers a stage.
             let sampled = pass.bindings.iter().filter(|b| b.access == Access::Read);
-            let textures = sampled.filter(|b| !matches!(b.variable.as_str(), "constants" | "in_tiles" | "in_args"));
+            let textures = sampled.filter(|b| !matches!(b.variable.as_str(), "frame" | "in_tiles" | "in_args"));
             prop_assert!(textures.count() <= 16, "{}", pass.name);
         }
         let moves_hits = features.hit_motion && features.mirror_parallax && !is_published;

@@ -87,11 +87,7 @@ struct Frame {
     constant_roughness: f32,
 }
 
-@group(0) @binding(0) var<uniform> constants: Frame;
-
-// The constants, which every entry point copies first: some software drivers load one anew for each lane wherever it is
-// used. On GPUs the copy is none.
-var<private> frame: Frame;
+@group(0) @binding(0) var<uniform> frame: Frame;
 
 // Centre of a pixel in uv, origin top left.
 fn pixel_uv(pixel: vec2<u32>) -> vec2<f32> {

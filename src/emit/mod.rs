@@ -1,5 +1,6 @@
 //! Kernels in the languages of graphics APIs: SPIR-V by naga, texts for people by limpid itself.
 
+mod constants;
 mod spirv;
 mod text;
 

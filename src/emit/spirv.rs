@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Checks;
 use crate::Error;
-use crate::kernel::Kernel;
+use crate::kernel::{Kernel, validator};
 
 /// Version of SPIR-V. Vulkan 1.0 accepts 1.0, Vulkan 1.1 up to 1.3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
@@ -69,7 +69,9 @@ impl Kernel {
             emit_int_div_checks: is_robust,
             ..spv::Options::default()
         };
-        let mut module = self.module.clone();
+        let fail = |report| Error::Kernel { kernel: self.name, stage: "write SPIR-V", report };
+        let mut module = self.module_for_spirv();
+        let info = validator().validate(&module).map_err(|error| fail(error.to_string()))?;
         for (_, variable) in module.global_variables.iter_mut() {
             if let Some(at) = &mut variable.binding {
                 at.group += options.first_set;
@@ -78,10 +80,6 @@ impl Kernel {
         }
         let pipeline =
             spv::PipelineOptions { shader_stage: naga::ShaderStage::Compute, entry_point: self.name.to_owned() };
-        spv::write_vec(&module, &self.info, &naga_options, Some(&pipeline)).map_err(|error| Error::Kernel {
-            kernel: self.name,
-            stage: "write SPIR-V",
-            report: error.to_string(),
-        })
+        spv::write_vec(&module, &info, &naga_options, Some(&pipeline)).map_err(|error| fail(error.to_string()))
     }
 }

@@ -21,8 +21,7 @@ bool LimpidRayIsCopied(uint entry, uint neighbor) {
 impl Export<'_> {
     /// The constant buffer, conventions, and the ray list if there is one.
     pub(super) fn hlsl_header(&self) -> Result<String, Error> {
-        let frame =
-            self.kernels.iter().find(|kernel| kernel.bindings.iter().any(|binding| binding.name == "constants"));
+        let frame = self.kernels.iter().find(|kernel| kernel.bindings.iter().any(|binding| binding.name == "frame"));
         let text = frame.map(|kernel| kernel.hlsl(&self.options.hlsl)).transpose()?.unwrap_or_default();
         let structure =
             text.split("struct Frame {").nth(1).and_then(|rest| rest.split("};").next()).unwrap_or_default();

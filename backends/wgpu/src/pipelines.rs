@@ -79,9 +79,11 @@ impl Pipeline {
             bind_group_layouts: &groups.each_ref().map(Option::as_ref),
             immediate_size: 0,
         });
+        let takes_spirv = device.adapter_info().backend == wgpu::Backend::Vulkan;
+        let module = if takes_spirv { kernel.module_for_spirv() } else { kernel.module.clone() };
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(&label),
-            source: wgpu::ShaderSource::Naga(Cow::Owned(kernel.module.clone())),
+            source: wgpu::ShaderSource::Naga(Cow::Owned(module)),
         });
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(&label),
