@@ -13,8 +13,8 @@
 //! in   block_list, args  lists                 whole blocks
 //! out  history           rgba16float   full    accumulated radiance, its length, noise and hit share
 //!
-//! Grid: one invocation a block, 64 listed blocks a workgroup (indirect). Loads 4 blocks (without interpolation 1), 9 guides, 8 histories (one
-//! history: 5 and 4), 16 radiances, stores 16 histories.
+//! Grid: one invocation a block, 64 listed blocks a workgroup (indirect). Loads 4 blocks (without interpolation 1),
+//! 9 guides, 8 histories (one history: 5 and 4), 16 radiances, stores 16 histories.
 
 import package::accumulate;
 
