@@ -3,7 +3,7 @@
 //!
 //! in/out  block_counters   2 x u32    other blocks, whole blocks
 //! out     block_args       12 x u32   workgroups in x, y, z, and the length of the list: of other blocks by pixel, of whole
-//!                                     blocks by pixel, of whole blocks
+//!                                     blocks by quad, of whole blocks
 //!
 //! Grid: one invocation.
 
@@ -19,7 +19,7 @@ fn grid_of(length: u32, per_group: u32) -> vec4<u32> {
 @compute @workgroup_size(1)
 fn block_args() {
     out_block_args[0] = grid_of(inout_block_counters[0], BLOCKS_PER_GROUP);
-    out_block_args[1] = grid_of(inout_block_counters[1], 16u);
+    out_block_args[1] = grid_of(inout_block_counters[1], BLOCKS_PER_GROUP_OF_QUADS);
     out_block_args[2] = grid_of(inout_block_counters[1], 64u);
     inout_block_counters[0] = 0u;
     inout_block_counters[1] = 0u;

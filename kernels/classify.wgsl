@@ -172,7 +172,6 @@ fn classify(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_i
         }
     }
     workgroupBarrier();
-    // Read once: in a loop, software drivers load constants anew in each turn.
     let encoding = depth_encoding();
     let on_screen = tiles_on_screen(group.xy, lane);
     var decoded = on_screen;

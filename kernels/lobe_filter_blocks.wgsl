@@ -13,16 +13,16 @@ import package::lobe_filter;
 
 @compute @workgroup_size(64)
 fn lobe_filter_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let index = list_index(group) * 16u + lane / 4u;
+    let index = list_index(group) * BLOCKS_PER_GROUP_OF_QUADS + lane / 4u;
     if index >= in_block_args[1].w {
         return;
     }
     let place = unpack_tile(in_block_list[block_count() - 1u - index]);
     let own = unpack_block(textureLoad(in_blocks, place, 0));
-    let quadrant = vec2<u32>(lane & 1u, (lane >> 1u) & 1u);
-    let first = place * BLOCK_SIZE + quadrant * 2u;
+    let quarter = quarter_of(lane);
+    let first = place * BLOCK_SIZE + quarter * 2u;
     // The surface next to the other blocks: what they are to it, it is to them.
-    let outer = place * BLOCK_SIZE + quadrant * 3u;
+    let outer = place * BLOCK_SIZE + quarter * 3u;
     let guide = load_guide(outer);
     let plane = pixel_plane_of(guide, world_position(outer, guide.depth));
     let top_left = block_tap(corner_of(first, 0u).block, plane, own.share);
@@ -31,18 +31,13 @@ fn lobe_filter_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_in
     let bottom_right = block_tap(corner_of(first, 3u).block, plane, own.share);
     for (var i = 0u; i < 4u; i++) {
         let pixel = first + vec2<u32>(i & 1u, i >> 1u);
-        let across = between_blocks(pixel).fraction;
-        let fitting = mix(
-            mix(top_left.fitting, top_right.fitting, across.x),
-            mix(bottom_left.fitting, bottom_right.fitting, across.x),
-            across.y,
-        );
-        let variance = mix(
-            mix(top_left.variance, top_right.variance, across.x),
-            mix(bottom_left.variance, bottom_right.variance, across.x),
-            across.y,
-        );
-        let wide = wide_of(fitting, variance);
+        let after = between_blocks(pixel).fraction;
+        let before = 1.0 - after;
+        let w = vec4<f32>(before.x, after.x, before.x, after.x) * vec4<f32>(before.yy, after.yy);
+        let top = top_left.fitting * w.x + top_right.fitting * w.y;
+        let bottom = bottom_left.fitting * w.z + bottom_right.fitting * w.w;
+        let variances = vec4<f32>(top_left.variance, top_right.variance, bottom_left.variance, bottom_right.variance);
+        let wide = wide_of(top + bottom, dot(variances, w));
         store_result(pixel, without_exposure(vec4<f32>(wide.radiance, wide.variance)));
     }
 }

@@ -571,13 +571,7 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         "LIGHT_CHANGE" => f64::from(features.light_change),
         "OUTLIER_SPREAD" => f64::from(features.outlier_spread),
         "BLOCK_STATISTICS" => f64::from(features.compares_with_blocks()),
-        "BLOCK_TAPS" => {
-            if features.block_interpolation {
-                4.0
-            } else {
-                1.0
-            }
-        }
+        "BLOCK_TAPS" => f64::from(if features.block_interpolation { 4 } else { 1 }),
         "SAMPLES_ARE_USED" => f64::from(features.light_change || features.outlier_spread),
         "NEAR_TAPS" => f64::from(if features.spatial_filter { features.near_taps } else { 0 }),
         "WIDE_TAPS" => f64::from(features.wide_taps),

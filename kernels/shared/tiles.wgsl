@@ -44,6 +44,8 @@ fn list_index(group: vec3<u32>) -> u32 {
 
 // Blocks of their list that a workgroup of 64 invocations handles in passes over pixels of listed blocks.
 const BLOCKS_PER_GROUP: u32 = 4u;
+// And in passes over their quads of 2x2 pixels.
+const BLOCKS_PER_GROUP_OF_QUADS: u32 = 16u;
 
 // Position in its list of the block that an invocation handles a pixel of.
 fn listed_block_index(group: vec3<u32>, lane: u32) -> u32 {
@@ -71,7 +73,12 @@ fn block_list_index(group: vec3<u32>, lane: u32) -> u32 {
     return list_index(group) * TILES_PER_GROUP + lane / 4u;
 }
 
+// Quarter of what four invocations share: of a tile a block, of a block a quad.
+fn quarter_of(lane: u32) -> vec2<u32> {
+    return vec2<u32>(lane & 1u, (lane >> 1u) & 1u);
+}
+
 // That block of the tile.
 fn block_of_tile(tile: vec2<u32>, lane: u32) -> vec2<u32> {
-    return tile * 2u + vec2<u32>(lane & 1u, (lane >> 1u) & 1u);
+    return tile * 2u + quarter_of(lane);
 }

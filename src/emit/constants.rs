@@ -9,7 +9,7 @@ impl Kernel {
     /// variable, which everything reads.
     ///
     /// From the buffer Mesa's lavapipe loads a scalar eight times, once a lane, wherever it is used inside of branches and
-    /// loops: a tenth of all instructions. RADV makes the same of both, or up to 3 % less of the copy.
+    /// loops: 6 % of all instructions of the preset `fast`. RADV makes the same of both, or up to 3 % less of the copy.
     pub fn module_for_spirv(&self) -> Module {
         let mut module = self.module.clone();
         let buffers = module.global_variables.iter().filter(|(_, variable)| variable.space == AddressSpace::Uniform);
