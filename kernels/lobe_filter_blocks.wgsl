@@ -33,7 +33,7 @@ fn lobe_filter_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_in
         let pixel = first + vec2<u32>(i & 1u, i >> 1u);
         let after = between_blocks(pixel).fraction;
         let before = 1.0 - after;
-        let w = vec4<f32>(before.x, after.x, before.x, after.x) * vec4<f32>(before.yy, after.yy);
+        let w = vec4<f32>(before.x, after.x, before.x, after.x) * vec4<f32>(before.y, before.y, after.y, after.y);
         let top = top_left.fitting * w.x + top_right.fitting * w.y;
         let bottom = bottom_left.fitting * w.z + bottom_right.fitting * w.w;
         let variances = vec4<f32>(top_left.variance, top_right.variance, bottom_left.variance, bottom_right.variance);
