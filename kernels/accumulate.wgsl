@@ -92,6 +92,7 @@ struct Surroundings {
     mean: vec3<f32>,
     share: f32,
     excess: vec3<f32>,
+    certainty: f32,
     deviation: f32,
     // How well they fit, 0 to 1.
     fit: f32,
@@ -112,6 +113,7 @@ fn surroundings_of(pixel: vec2<u32>, plane: Plane) -> Surroundings {
         sum.mean += tap.radiance * w;
         sum.share += tap.share * w;
         sum.excess += tap.excess * w;
+        sum.certainty += tap.certainty * w;
         sum.deviation += tap.deviation * w;
         weight += w;
     }
@@ -119,6 +121,7 @@ fn surroundings_of(pixel: vec2<u32>, plane: Plane) -> Surroundings {
     sum.mean *= normalization;
     sum.share *= normalization;
     sum.excess *= normalization;
+    sum.certainty *= normalization;
     sum.deviation *= normalization;
     sum.fit = smoothstep(0.0, FIT, weight);
     return sum;
@@ -130,16 +133,20 @@ fn peaks_of(pixel: vec2<u32>) -> vec2<f32> {
 }
 
 // The sample of this frame, exposed, without what makes it an outlier.
-fn sample_of(pixel: vec2<u32>, guide: Guide, around: Surroundings) -> vec3<f32> {
+fn sample_of(pixel: vec2<u32>, guide: Guide) -> vec3<f32> {
     let radiance = load_radiance(pixel);
     if OUTLIER_SPREAD {
-        let kept = without_outlier(radiance, peaks_of(pixel).x, guide.roughness);
-        // Very rare samples would come back as blotches.
-        let returned = min(1.0, frame.excess_limit * luminance(around.mean) / luminance(around.excess));
-        let excess = around.excess * (returned * around.fit);
-        return kept + select(excess, vec3<f32>(0.0), guide.roughness < OUTLIER_ROUGHNESS);
+        return without_outlier(radiance, peaks_of(pixel).x, guide.roughness);
     }
     return radiance;
+}
+
+// What comes back of the outliers around. What is rare would come back as blotches, and does so as frames bear it out.
+fn returned_excess(around: Surroundings, length: f32, roughness: f32) -> vec3<f32> {
+    let limit = min(1.0, frame.excess_limit * luminance(around.mean) / luminance(around.excess));
+    let borne_out = around.certainty * (length + 1.0) / (around.certainty * length + 1.0);
+    let excess = around.excess * (limit * around.fit * borne_out);
+    return select(excess, vec3<f32>(0.0), roughness < OUTLIER_ROUGHNESS);
 }
 
 // What last frame had at some place.
@@ -284,7 +291,7 @@ fn history_at(prev_uv: vec2<f32>, subject: Subject, tolerance: Tolerance) -> Fou
 
 // What a pixel knows of its surroundings by itself: the sample, and nothing about hit distances.
 fn alone(pixel: vec2<u32>) -> Surroundings {
-    return Surroundings(load_radiance(pixel), 0.5, vec3<f32>(0.0), ALONE_DEVIATION, 0.0);
+    return Surroundings(load_radiance(pixel), 0.5, vec3<f32>(0.0), 0.0, ALONE_DEVIATION, 0.0);
 }
 
 fn subject_of(pixel: vec2<u32>, guide: Guide) -> Subject {
@@ -299,7 +306,7 @@ fn subject_of(pixel: vec2<u32>, guide: Guide) -> Subject {
     let own_share = select(around.share, hit_share(distance, camera_distance_of(position)), distance > 0.0);
     // Single hit distances of rough surfaces say little, and go with the colour of their sample.
     let share = mix(own_share, around.share, smoothstep(0.03, 0.2, guide.roughness) * around.fit);
-    return Subject(guide, position, around, sample_of(pixel, guide, around), share, false);
+    return Subject(guide, position, around, sample_of(pixel, guide), share, false);
 }
 
 // The two histories that a pixel can have, and where they were last frame.
@@ -443,6 +450,7 @@ fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
     let found = believed(chosen(candidates_of(pixel, subject), subject), pixel, subject);
     var radiance = subject.radiance;
     if OUTLIER_SPREAD {
+        radiance += returned_excess(subject.around, found.length, guide.roughness);
         radiance = without_pair(radiance, pair_limit(pixel, found), found, guide.roughness);
     }
     return continued(found, radiance, subject.share, squared_residual(radiance, found));

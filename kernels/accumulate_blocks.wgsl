@@ -34,15 +34,17 @@ fn accumulate_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_inv
     let subject = Subject(guide, position, around, around.mean, around.share, true);
     let found = believed(chosen(candidates_of(pixel, subject), subject), pixel, subject);
     var limit = 0.0;
+    var excess = vec3<f32>(0.0);
     if OUTLIER_SPREAD {
         limit = pair_limit(pixel, found);
+        excess = returned_excess(around, found.length, guide.roughness);
     }
     var radiance = vec3<f32>(0.0);
     var residuals = 0.0;
     for (var i = 0u; i < BLOCK_PIXELS; i++) {
-        var sample = sample_of(corner + position_in_block(i), guide, around);
+        var sample = sample_of(corner + position_in_block(i), guide);
         if OUTLIER_SPREAD {
-            sample = without_pair(sample, limit, found, guide.roughness);
+            sample = without_pair(sample + excess, limit, found, guide.roughness);
         }
         radiance += sample;
         residuals += squared_residual(sample, found);

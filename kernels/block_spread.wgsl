@@ -2,7 +2,7 @@
 //!
 //! in   blocks   rgba32uint   block   of the input, or of what was accumulated
 //! in   tiles, args   lists           tiles to denoise
-//! out  blocks   rgba32uint   block   with its excess, or its radiance, filtered
+//! out  blocks   rgba32uint   block   with its excess, and how far to believe that, or its radiance, filtered
 //!
 //! Grid: one invocation a block, workgroups of the blocks of 16 listed tiles (indirect).
 //! Up to 2 WIDE_TAPS + 1 taps a side, 81 in all, on a grid that stretches with the footprint; narrow ones take fewer.
@@ -17,6 +17,12 @@ import package::shared::tiles;
 override ACCUMULATED: bool = false;
 // Most taps on either side of the centre, along and across.
 override WIDE_TAPS: i32 = 4;
+
+// Of how many equally bright blocks the excess has to be the mean to be believed by half.
+const EXCESS_DOUBT: f32 = 1.4;
+// Neighbouring blocks hold the same outliers: after the mean over 3x3 blocks, so many of them. Blocks further apart hold
+// others, and count for more.
+const BLOCKS_OF_OUTLIER: f32 = 8.0;
 
 @group(1) @binding(0) var in_blocks: texture_2d<u32>;
 @group(1) @binding(1) var out_blocks: texture_storage_2d<rgba32uint, write>;
@@ -63,6 +69,8 @@ fn block_spread(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     let rho_y = vec2<f32>(footprint.axis.y, side.y) * inverse_radius;
     // rgb: radiance or excess; a: weight.
     var sum = vec4<f32>(0.0);
+    // Of luminance times weight.
+    var squares = 0.0;
     var grid = -far;
     for (var i = 0; i < taps; i++) {
         let offset = round(along * grid.x + across * grid.y);
@@ -74,11 +82,14 @@ fn block_spread(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
         let rho = offset.x * rho_x + offset.y * rho_y;
         let penalty = plane_penalty(plane, tap.guide, block_place(at)) + 1.2 * dot(rho, rho);
         let fits = tap.guide.denoised && all(at == wanted);
+        let apart = (tap.share - block.share) * (1.0 / BLOCK_SHARE_TOLERANCE);
+        let w = select(0.0, exp(-penalty - apart * apart), fits);
         if ACCUMULATED {
-            let apart = (tap.share - block.share) * (1.0 / SHARE_TOLERANCE);
-            sum += vec4<f32>(tap.radiance, 1.0) * select(0.0, exp(-penalty - apart * apart), fits);
+            sum += vec4<f32>(tap.radiance, 1.0) * w;
         } else {
-            sum += vec4<f32>(tap.excess, 1.0) * select(0.0, exp(-penalty), fits);
+            sum += vec4<f32>(tap.excess, 1.0) * w;
+            let l = luminance(tap.excess) * w;
+            squares += l * l;
         }
     }
     let mean = sum.rgb / max(sum.w, 1e-6);
@@ -87,6 +98,9 @@ fn block_spread(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     } else {
         // Where the footprint is smaller than a pixel there is nothing to spread over.
         block.excess = select(mean, vec3<f32>(0.0), footprint.along < 0.5);
+        let l = luminance(sum.rgb);
+        let doubt = EXCESS_DOUBT / min(step.x * step.y, BLOCKS_OF_OUTLIER);
+        block.certainty = l * l / max(l * l + doubt * squares, 1e-30);
     }
     textureStore(out_blocks, center, pack_block(block));
 }

@@ -53,8 +53,6 @@ const PIXEL_NORMAL_TOLERANCE: f32 = 0.02;
 // Half axis of the filter, in pixels, from and to which blocks take over.
 const WIDE_FROM: f32 = 0.7;
 const WIDE_TO: f32 = 2.5;
-// Blocks whose hit share differs by this show other things: contact shadows of a light that is far away end sharply.
-const WIDE_SHARE: f32 = 0.15;
 // Half axis below which, and from which no longer, taps may differ by noise alone.
 const SHARP_TO: f32 = 0.3;
 const SHARP_FROM: f32 = 0.7;
@@ -85,7 +83,7 @@ struct BlockTap {
 
 fn block_tap(block: vec2<i32>, plane: Plane, own_share: f32) -> BlockTap {
     let tap = unpack_block(textureLoad(in_blocks, block, 0));
-    let apart = (tap.share - own_share) * (1.0 / WIDE_SHARE);
+    let apart = (tap.share - own_share) * (1.0 / BLOCK_SHARE_TOLERANCE);
     let penalty = plane_penalty(plane, tap.guide, block_place(block)) + apart * apart;
     let fit = select(0.0, exp(-penalty), tap.guide.denoised);
     return BlockTap(vec4<f32>(tap.radiance, 1.0) * fit, select(0.0, tap.deviation * tap.deviation, tap.guide.denoised));

@@ -14,6 +14,8 @@ struct Block {
     radiance: vec3<f32>,
     // Mean of what was cut off from outliers, exposed.
     excess: vec3<f32>,
+    // How far one frame's is to be believed, 0 to 1: less the fewer blocks it is from.
+    certainty: f32,
     // Hit share.
     share: f32,
     // Deviation of brightness, 0 to 1.
@@ -26,19 +28,19 @@ struct Block {
 // else the last bit of a sum, which differs between devices, would decide.
 const ROUNDING: f32 = 0.50390625;
 
-// Three numbers of 9 bits with an exponent in common, rounded to nearest: rgb9e5.
-fn pack_shared_exponent(radiance: vec3<f32>) -> u32 {
+// Three numbers of 9 bits or fewer with an exponent of 5 in common, rounded to nearest; of 9 that is rgb9e5.
+fn pack_shared_exponent(radiance: vec3<f32>, bits: u32) -> u32 {
     let c = clamp(radiance, vec3<f32>(0.0), vec3<f32>(65408.0));
     let largest = max(c.x, max(c.y, c.z));
     let exponent = clamp(i32(bitcast<u32>(largest * 1.001) >> 23u) - 126, -15, 16);
-    let scale = exp2(f32(9 - exponent));
-    let words = min(vec3<u32>(floor(c * scale + ROUNDING)), vec3<u32>(511u));
-    return words.x | (words.y << 9u) | (words.z << 18u) | (u32(exponent + 15) << 27u);
+    let scale = exp2(f32(i32(bits) - exponent));
+    let words = min(vec3<u32>(floor(c * scale + ROUNDING)), vec3<u32>((1u << bits) - 1u));
+    return words.x | (words.y << bits) | (words.z << (2u * bits)) | (u32(exponent + 15) << (3u * bits));
 }
 
-fn unpack_shared_exponent(word: u32) -> vec3<f32> {
-    let scale = exp2(f32(word >> 27u) - 24.0);
-    return vec3<f32>(vec3<u32>(word, word >> 9u, word >> 18u) & vec3<u32>(511u)) * scale;
+fn unpack_shared_exponent(word: u32, bits: u32) -> vec3<f32> {
+    let scale = exp2(f32((word >> (3u * bits)) & 31u) - f32(15u + bits));
+    return vec3<f32>(vec3<u32>(word, word >> bits, word >> (2u * bits)) & vec3<u32>((1u << bits) - 1u)) * scale;
 }
 
 fn pack_block(block: Block) -> vec4<u32> {
@@ -48,11 +50,12 @@ fn pack_block(block: Block) -> vec4<u32> {
     // The last 8 bits of depth and its sign make room.
     let depth = ((bitcast<u32>(block.guide.depth) + 128u) & 0x7fffff00u) | select(0u, 0x80000000u, block.is_whole);
     let deviation = u32(round(saturate(block.deviation) * 255.0));
+    let certainty = u32(round(saturate(block.certainty) * 63.0));
     return vec4<u32>(
         select(0u, depth | deviation, block.guide.denoised),
         oct.x | (oct.y << 9u) | (roughness << 18u) | (share << 24u),
-        pack_shared_exponent(block.radiance),
-        pack_shared_exponent(block.excess),
+        pack_shared_exponent(block.radiance, 9u),
+        pack_shared_exponent(block.excess, 7u) | (certainty << 26u),
     );
 }
 
@@ -65,8 +68,9 @@ fn unpack_block(texel: vec4<u32>) -> Block {
     block.guide.denoised = texel.x != 0u;
     block.share = f32(texel.y >> 24u) * (1.0 / 255.0);
     block.deviation = f32(texel.x & 255u) * (1.0 / 255.0);
-    block.radiance = unpack_shared_exponent(texel.z);
-    block.excess = unpack_shared_exponent(texel.w);
+    block.radiance = unpack_shared_exponent(texel.z, 9u);
+    block.excess = unpack_shared_exponent(texel.w, 7u);
+    block.certainty = f32(texel.w >> 26u) * (1.0 / 63.0);
     block.is_whole = texel.x >= 0x80000000u;
     return block;
 }

@@ -11,8 +11,10 @@ const NORMAL_TOLERANCE: f32 = 0.04;
 const ROUGHNESS_SHARE: f32 = 0.35;
 const ROUGHNESS_FLOOR: f32 = 0.02;
 
-// Hit shares further apart belong to different things.
+// Hit shares further apart belong to different things; between blocks, whose shares are means: contact shadows of a light
+// that is far away end sharply.
 const SHARE_TOLERANCE: f32 = 0.3;
+const BLOCK_SHARE_TOLERANCE: f32 = 0.15;
 
 // Half axes in pixels, and the direction of the longer one.
 struct Footprint {
