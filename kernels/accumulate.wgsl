@@ -91,6 +91,7 @@ const ALONE_DEVIATION: f32 = 0.1;
 struct Surroundings {
     mean: vec3<f32>,
     share: f32,
+    // What may come back of outliers, and how far one frame's is to be believed.
     excess: vec3<f32>,
     certainty: f32,
     deviation: f32,
@@ -124,6 +125,9 @@ fn surroundings_of(pixel: vec2<u32>, plane: Plane) -> Surroundings {
     sum.certainty *= normalization;
     sum.deviation *= normalization;
     sum.fit = smoothstep(0.0, FIT, weight);
+    if OUTLIER_SPREAD {
+        sum.excess *= sum.fit * min(1.0, frame.excess_limit * luminance(sum.mean) / luminance(sum.excess));
+    }
     return sum;
 }
 
@@ -143,10 +147,8 @@ fn sample_of(pixel: vec2<u32>, guide: Guide) -> vec3<f32> {
 
 // What comes back of the outliers around. What is rare would come back as blotches, and does so as frames bear it out.
 fn returned_excess(around: Surroundings, length: f32, roughness: f32) -> vec3<f32> {
-    let limit = min(1.0, frame.excess_limit * luminance(around.mean) / luminance(around.excess));
     let borne_out = around.certainty * (length + 1.0) / (around.certainty * length + 1.0);
-    let excess = around.excess * (limit * around.fit * borne_out);
-    return select(excess, vec3<f32>(0.0), roughness < OUTLIER_ROUGHNESS);
+    return select(around.excess * borne_out, vec3<f32>(0.0), roughness < OUTLIER_ROUGHNESS);
 }
 
 // What last frame had at some place.
