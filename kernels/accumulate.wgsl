@@ -13,8 +13,9 @@
 //! in   tiles, args   lists                tiles to denoise, or blocks (whole blocks)
 //! out  history       rgba16float  full    accumulated radiance, its length, noise and hit share
 //!
-//! Grid: one workgroup per listed tile or four listed blocks (indirect). Loads 4 blocks (without
-//! interpolation 1), 8 guides, 8 histories (one history: 4 and 4), 9 radiances at most.
+//! Grid: an invocation for each 2x2 pixels; one workgroup per 4 listed tiles or 16 listed blocks (indirect). Loads for each
+//! of them 9 guides, 8 histories (one history: 5 and 4), a radiance and 4 blocks, for all four 16 more radiances at most and,
+//! without interpolation, the only block.
 //! After: accumulation as in Schied et al. 2017 (SVGF); reflected points after Lagarde and de Rousiers 2014 (dominant
 //! direction of the lobe). The two candidates are mixed by how well each fits the blocks of this frame; how far they
 //! lie apart, against the footprint, bounds what history is worth.
@@ -72,9 +73,9 @@ const ONE_BY_SURFACE_FROM: f32 = 0.1;
 // A sample so many times as bright as its surroundings has hit what few rays hit: that its hit distance is another
 // than history's is no reason to forget history.
 const RARE: f32 = 2.0;
-// Weight of a mirror's own sample among the 3x3 that bound its history, and roughness from which it has none extra:
+// Weight of a mirror's own sample among the 4x4 that bound its history, and roughness from which it has none extra:
 // lamps in mirrors have edges, and the deviation across an edge bounds nothing.
-const MIRROR_WEIGHT: f32 = 20.0;
+const MIRROR_WEIGHT: f32 = 36.0;
 const MIRROR_UP_TO: f32 = 0.03;
 
 // Outliers of which there are two count up to so many times what bounds single ones, against the third sample of their
@@ -99,15 +100,17 @@ struct Surroundings {
     fit: f32,
 }
 
-fn surroundings_of(pixel: vec2<u32>, plane: Plane) -> Surroundings {
+fn surroundings_of(pixel: vec2<u32>, plane: Plane, own: vec4<u32>) -> Surroundings {
     var sum: Surroundings;
     var weight = 1e-6;
     for (var i = 0u; i < BLOCK_TAPS; i++) {
         var corner = Corner(vec2<i32>(pixel / BLOCK_SIZE), 1.0);
+        var texel = own;
         if BLOCK_TAPS == 4u {
             corner = corner_of(pixel, i);
+            texel = textureLoad(in_blocks, corner.block, 0);
         }
-        let tap = unpack_block(textureLoad(in_blocks, corner.block, 0));
+        let tap = unpack_block(texel);
         // The least weights are for pixels whose surface no block shows.
         let fit = exp(-plane_penalty(plane, tap.guide, block_place(corner.block))) + 1e-5;
         let w = select(0.0, (corner.weight + 1e-3) * fit, tap.guide.denoised);
@@ -131,16 +134,31 @@ fn surroundings_of(pixel: vec2<u32>, plane: Plane) -> Surroundings {
     return sum;
 }
 
-// The second and third largest luminance of a pixel's block.
-fn peaks_of(pixel: vec2<u32>) -> vec2<f32> {
-    return unpack2x16float(textureLoad(in_samples, pixel / BLOCK_SIZE, 0).x);
+// What the pixels of a quad share.
+struct Quad {
+    // Texel of the block that it is in.
+    block: vec4<u32>,
+    // The second and third largest luminance there.
+    peaks: vec2<f32>,
+}
+
+fn quad_of(pixel: vec2<u32>) -> Quad {
+    let place = pixel / BLOCK_SIZE;
+    var quad: Quad;
+    if BLOCK_STATISTICS {
+        quad.block = textureLoad(in_blocks, place, 0);
+    }
+    if OUTLIER_SPREAD {
+        quad.peaks = unpack_samples(textureLoad(in_samples, place, 0).xy).peaks;
+    }
+    return quad;
 }
 
 // The sample of this frame, exposed, without what makes it an outlier.
-fn sample_of(pixel: vec2<u32>, guide: Guide) -> vec3<f32> {
+fn sample_of(pixel: vec2<u32>, guide: Guide, quad: Quad) -> vec3<f32> {
     let radiance = load_radiance(pixel);
     if OUTLIER_SPREAD {
-        return without_outlier(radiance, peaks_of(pixel).x, guide.roughness);
+        return without_outlier(radiance, quad.peaks.x, guide.roughness);
     }
     return radiance;
 }
@@ -194,22 +212,35 @@ fn misfit(history: vec3<f32>, around: Surroundings) -> f32 {
     return (d.x + d.y + d.z) / (around.deviation + 0.02);
 }
 
-// Moves history towards the mean of the 3x3 pixels where it is beyond their deviation.
-fn clipped(history: vec3<f32>, own: vec3<f32>, pixel: vec2<u32>, roughness: f32) -> vec3<f32> {
-    let weight = MIRROR_WEIGHT * (1.0 - smoothstep(0.0, MIRROR_UP_TO, roughness));
-    var sum = squeezed(own) * weight;
-    var squares = sum * squeezed(own);
-    // Rougher surfaces are not clipped.
-    let count = select(0, 9, roughness < frame.accumulate_clip_roughness);
-    for (var i = 0; i < count; i++) {
-        let at = clamp(vec2<i32>(pixel) + vec2<i32>(i % 3, i / 3) - 1, vec2<i32>(0), vec2<i32>(frame.size) - 1);
+// Squeezed radiance of the 4x4 pixels around a quad.
+struct Window {
+    is_known: bool,
+    sum: vec3<f32>,
+    squares: vec3<f32>,
+}
+
+// Looked at once for all pixels of a quad, whose first is `pixel`, if one is smooth.
+fn window_around(pixel: vec2<u32>, is_wanted: bool, known: Window) -> Window {
+    var window = known;
+    let count = select(0u, BLOCK_PIXELS, is_wanted && !known.is_known);
+    let corner = vec2<i32>(pixel) - 1;
+    for (var i = 0u; i < count; i++) {
+        let at = clamp(corner + vec2<i32>(position_in_block(i)), vec2<i32>(0), vec2<i32>(frame.size) - 1);
         let c = squeezed(load_radiance(vec2<u32>(at)));
-        sum += c;
-        squares += c * c;
+        window.sum += c;
+        window.squares += c * c;
     }
-    let normalization = 1.0 / (9.0 + weight);
-    let mean = sum * normalization;
-    let variance = max(squares * normalization - mean * mean, vec3<f32>(0.0));
+    window.is_known = known.is_known || is_wanted;
+    return window;
+}
+
+// Moves history towards the mean of a window where it is beyond its deviation.
+fn clipped(history: vec3<f32>, own: vec3<f32>, window: Window, roughness: f32) -> vec3<f32> {
+    let weight = MIRROR_WEIGHT * (1.0 - smoothstep(0.0, MIRROR_UP_TO, roughness));
+    let c_own = squeezed(own);
+    let normalization = 1.0 / (f32(BLOCK_PIXELS) + weight);
+    let mean = (window.sum + c_own * weight) * normalization;
+    let variance = max((window.squares + c_own * c_own * weight) * normalization - mean * mean, vec3<f32>(0.0));
     let extent = sqrt(variance) * frame.accumulate_clip_scale + 0.02;
     let c = clamp(squeezed(history), max(mean - extent, vec3<f32>(0.0)), min(mean + extent, vec3<f32>(0.9999)));
     return c / (1.0 - c);
@@ -296,11 +327,11 @@ fn alone(pixel: vec2<u32>) -> Surroundings {
     return Surroundings(load_radiance(pixel), 0.5, vec3<f32>(0.0), 0.0, ALONE_DEVIATION, 0.0);
 }
 
-fn subject_of(pixel: vec2<u32>, guide: Guide) -> Subject {
+fn subject_of(pixel: vec2<u32>, guide: Guide, quad: Quad) -> Subject {
     let position = world_position(pixel, guide.depth);
     var around: Surroundings;
     if BLOCK_STATISTICS {
-        around = surroundings_of(pixel, plane_of(guide, position));
+        around = surroundings_of(pixel, plane_of(guide, position), quad.block);
     } else {
         around = alone(pixel);
     }
@@ -308,7 +339,7 @@ fn subject_of(pixel: vec2<u32>, guide: Guide) -> Subject {
     let own_share = select(around.share, hit_share(distance, camera_distance_of(position)), distance > 0.0);
     // Single hit distances of rough surfaces say little, and go with the colour of their sample.
     let share = mix(own_share, around.share, smoothstep(0.03, 0.2, guide.roughness) * around.fit);
-    return Subject(guide, position, around, sample_of(pixel, guide), share, false);
+    return Subject(guide, position, around, sample_of(pixel, guide, quad), share, false);
 }
 
 // The two histories that a pixel can have, and where they were last frame.
@@ -400,15 +431,14 @@ fn chosen(candidates: Candidates, subject: Subject) -> Found {
 }
 
 // History, as far as this frame bears it out.
-fn believed(history: Found, pixel: vec2<u32>, subject: Subject) -> Found {
+fn believed(history: Found, subject: Subject, light_change: f32, window: Window) -> Found {
     let roughness = subject.guide.roughness;
     var found = history;
     if LIGHT_CHANGE {
-        let light = unpack_light(textureLoad(in_light, pixel / BLOCK_SIZE, 0).x);
-        found.length *= 1.0 - light.changed * smoothstep(0.05, 0.2, roughness);
+        found.length *= 1.0 - light_change * smoothstep(0.05, 0.2, roughness);
     }
     if HISTORY_CLIP {
-        let bounded = clipped(found.radiance, subject.radiance, pixel, roughness);
+        let bounded = clipped(found.radiance, subject.radiance, window, roughness);
         found.radiance = select(found.radiance, bounded, roughness < frame.accumulate_clip_roughness);
     }
     if OUTLIER_SPREAD {
@@ -421,8 +451,8 @@ fn believed(history: Found, pixel: vec2<u32>, subject: Subject) -> Found {
 }
 
 // Luminance above which a sample is one of two outliers in a block, which hide each other.
-fn pair_limit(pixel: vec2<u32>, found: Found) -> f32 {
-    return PAIR_FACTOR * frame.outlier_factor * max(peaks_of(pixel).y, luminance(found.radiance));
+fn pair_limit(quad: Quad, found: Found) -> f32 {
+    return PAIR_FACTOR * frame.outlier_factor * max(quad.peaks.y, luminance(found.radiance));
 }
 
 fn without_pair(radiance: vec3<f32>, pair_limit: f32, found: Found, roughness: f32) -> vec3<f32> {
@@ -447,27 +477,50 @@ fn continued(found: Found, radiance: vec3<f32>, share: f32, squared_residual: f3
     return history;
 }
 
-fn accumulated(pixel: vec2<u32>, guide: Guide) -> History {
-    let subject = subject_of(pixel, guide);
-    let found = believed(chosen(candidates_of(pixel, subject), subject), pixel, subject);
+fn accumulated(pixel: vec2<u32>, guide: Guide, quad: Quad, light_change: f32, window: Window) -> History {
+    let subject = subject_of(pixel, guide, quad);
+    let found = believed(chosen(candidates_of(pixel, subject), subject), subject, light_change, window);
     var radiance = subject.radiance;
     if OUTLIER_SPREAD {
         radiance += returned_excess(subject.around, found.length, guide.roughness);
-        radiance = without_pair(radiance, pair_limit(pixel, found), found, guide.roughness);
+        radiance = without_pair(radiance, pair_limit(quad, found), found, guide.roughness);
     }
     return continued(found, radiance, subject.share, squared_residual(radiance, found));
 }
 
-@compute @workgroup_size(8, 8)
+// Whether the light changed around a pixel, 0 to 1.
+fn light_change_at(pixel: vec2<u32>) -> f32 {
+    if LIGHT_CHANGE {
+        return unpack_light(textureLoad(in_light, pixel / BLOCK_SIZE, 0).x).changed;
+    }
+    return 0.0;
+}
+
+@compute @workgroup_size(64)
 fn accumulate(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let pixel = listed_pixel(group, lane);
-    if any(pixel >= frame.size) {
+    let first = listed_quad(group, lane);
+    if any(first >= frame.size) {
         return;
     }
-    let guide = load_guide(pixel);
-    var history = History(vec3<f32>(0.0), 0.0, 0.0, -1.0);
-    if guide.denoised {
-        history = accumulated(pixel, guide);
+    let quad = quad_of(first);
+    let light_change = light_change_at(first);
+    var window: Window;
+    var i = 0u;
+    loop {
+        let pixel = min(first + position_in_quad(i), frame.size - 1u);
+        let guide = load_guide(pixel);
+        if HISTORY_CLIP {
+            let is_clipped = guide.denoised && guide.roughness < frame.accumulate_clip_roughness;
+            window = window_around(first, is_clipped, window);
+        }
+        var history = History(vec3<f32>(0.0), 0.0, 0.0, -1.0);
+        if guide.denoised {
+            history = accumulated(pixel, guide, quad, light_change, window);
+        }
+        textureStore(out_history, pixel, pack_history(history));
+        i += 1u;
+        if i >= QUAD_PIXELS {
+            break;
+        }
     }
-    textureStore(out_history, pixel, pack_history(history));
 }

@@ -1,12 +1,10 @@
 //! Block average: averages radiance over the part of each 4x4 block that shows one surface.
 //!
 //! in   guide      rg32uint      full    packed G-buffer, or normal, roughness, depth
-//! in   radiance   any float     full    noisy input; a: hit distance (not when ACCUMULATED)
-//! in   history    rgba16float   full    this frame's accumulated radiance (when ACCUMULATED)
+//! in   radiance   any float     full    noisy input; a: hit distance
 //! in   tiles, args   lists             tiles to denoise
 //! out  blocks     rgba32uint    block   surface, mean radiance, hit share; what was cut off from outliers
-//! out  samples    rg32uint      block   second and third largest luminance, mean brightness, what one sample counts for (not
-//!                                       when ACCUMULATED)
+//! out  samples    rg32uint      block   second and third largest luminance, mean brightness, which pixels show the surface
 //!
 //! Grid: one invocation a block, workgroups of the blocks of 16 listed tiles (indirect).
 //! Each pixel is read once, the one in the middle twice.
@@ -19,12 +17,9 @@ import package::shared::gbuffer;
 import package::shared::radiance;
 import package::shared::outliers;
 import package::shared::footprint;
-import package::shared::history;
 import package::shared::blocks;
 import package::shared::tiles;
 
-// Averages what was accumulated, not the input.
-override ACCUMULATED: bool = false;
 // Cuts outliers off.
 override OUTLIER_SPREAD: bool = true;
 // Later passes work on whole blocks.
@@ -32,22 +27,17 @@ override WHOLE_BLOCKS: bool = false;
 // Some later pass uses `samples`.
 override SAMPLES_ARE_USED: bool = false;
 
-@group(1) @binding(1) var in_history: texture_2d<f32>;
 @group(1) @binding(2) var out_blocks: texture_storage_2d<rgba32uint, write>;
 @group(1) @binding(3) var out_samples: texture_storage_2d<rg32uint, write>;
 @group(1) @binding(4) var<storage, read> in_tiles: array<u32>;
 @group(1) @binding(5) var<storage, read> in_args: array<vec4<u32>, 4>;
 
-// Weight that the surface of the least fitting pixel of a whole block has.
-const WHOLE_WEIGHT: f32 = 0.37;
+// Weight from which on a pixel shows the surface of its block, as `block_average_accumulated` asks, and whole blocks do of
+// all their pixels.
+const SHOWN_WEIGHT: f32 = 0.15;
 
 // Pixels of a block, from its centre outwards: a digit is a pixel's place in its row, and four times that row.
 const FROM_CENTER: array<u32, 2> = array<u32, 2>(0x2184a695u, 0xf3c0b7edu);
-
-// Pixels of a block on screen.
-fn pixel_count(corner: vec2<u32>) -> vec2<u32> {
-    return min(frame.size - corner, vec2<u32>(BLOCK_SIZE));
-}
 
 // The denoised pixel nearest to the centre of a block, which stands for it; some other one where none is.
 fn central_pixel(corner: vec2<u32>) -> vec2<u32> {
@@ -109,57 +99,48 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
     var count = 0u;
     // x: weighted sum, y: weight of those that know.
     var share = vec2<f32>(0.0);
-    var noise = vec2<f32>(0.0);
-    var squared_weight = 0.0;
-    var least_weight = 1.0;
-    let size = pixel_count(corner);
-    for (var i = 0u; i < 4u * size.y; i++) {
-        let pixel = corner + vec2<u32>(i & 3u, i >> 2u);
-        if (i & 3u) >= size.x {
-            continue;
-        }
+    // A bit for each pixel that shows the surface.
+    var shown = 0u;
+    var i = 0u;
+    loop {
+        let wanted = corner + position_in_block(i);
+        let pixel = min(wanted, frame.size - 1u);
         let guide = load_guide(pixel);
-        let w = select(0.0, exp(-plane_penalty(plane, guide, vec2<f32>(pixel) + 0.5)), guide.denoised);
-        if ACCUMULATED {
-            let history = unpack_history(textureLoad(in_history, pixel, 0));
-            let c = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
-            sums = with_sample(sums, select(vec3<f32>(0.0), c, guide.denoised), w);
-            share += select(vec2<f32>(0.0), vec2<f32>(history.share, 1.0) * w, guide.denoised);
-            noise += select(vec2<f32>(0.0), vec2<f32>(history.noise, 1.0) * w, guide.denoised && history.noise >= 0.0);
-        } else {
-            let texel = textureLoad(in_radiance, pixel, 0);
-            let c = select(vec3<f32>(0.0), clean_radiance(texel.rgb * frame.exposure), guide.denoised);
-            let sample = Sample(c, select(0.0, luminance(c), guide.denoised), w);
-            let is_brighter = sample.luminance > brightest.luminance;
-            let darker = min(sample.luminance, brightest.luminance);
-            next = vec2<f32>(max(next.x, darker), max(next.y, min(next.x, darker)));
-            sums = with_sample(
-                sums,
-                select(sample.radiance, brightest.radiance, is_brighter),
-                select(sample.weight, brightest.weight, is_brighter),
-            );
-            brightest.radiance = select(brightest.radiance, sample.radiance, is_brighter);
-            brightest.weight = select(brightest.weight, sample.weight, is_brighter);
-            brightest.luminance = max(brightest.luminance, sample.luminance);
-            let distance = usable_hit_distance(texel.a);
-            share += select(vec2<f32>(0.0), vec2<f32>(hit_share(distance, camera_distance), 1.0) * w, distance > 0.0);
-            count += select(0u, 1u, guide.denoised);
+        let counts = guide.denoised && all(pixel == wanted);
+        let w = select(0.0, exp(-plane_penalty(plane, guide, vec2<f32>(pixel) + 0.5)), counts);
+        let texel = textureLoad(in_radiance, pixel, 0);
+        let c = select(vec3<f32>(0.0), clean_radiance(texel.rgb * frame.exposure), counts);
+        let sample = Sample(c, select(0.0, luminance(c), counts), w);
+        let is_brighter = sample.luminance > brightest.luminance;
+        let darker = min(sample.luminance, brightest.luminance);
+        next = vec2<f32>(max(next.x, darker), max(next.y, min(next.x, darker)));
+        sums = with_sample(
+            sums,
+            select(sample.radiance, brightest.radiance, is_brighter),
+            select(sample.weight, brightest.weight, is_brighter),
+        );
+        brightest.radiance = select(brightest.radiance, sample.radiance, is_brighter);
+        brightest.weight = select(brightest.weight, sample.weight, is_brighter);
+        brightest.luminance = max(brightest.luminance, sample.luminance);
+        let distance = usable_hit_distance(texel.a);
+        share += select(vec2<f32>(0.0), vec2<f32>(hit_share(distance, camera_distance), 1.0) * w, distance > 0.0);
+        count += select(0u, 1u, counts);
+        shown |= select(0u, 1u << i, w >= SHOWN_WEIGHT);
+        i += 1u;
+        if i >= block_pixels(corner) {
+            break;
         }
-        squared_weight += w * w;
-        least_weight = min(least_weight, w);
     }
     // A sample on its own is above no other.
     next.x = select(next.x, brightest.luminance, count < 2u);
     next.y = select(next.y, next.x, count < 3u);
     var excess = vec3<f32>(0.0);
-    if !ACCUMULATED {
-        var kept = brightest.radiance;
-        if OUTLIER_SPREAD {
-            kept = without_outlier(brightest.radiance, next.x, surface.roughness);
-            excess = (brightest.radiance - kept) * brightest.weight;
-        }
-        sums = with_sample(sums, kept, brightest.weight);
+    var kept = brightest.radiance;
+    if OUTLIER_SPREAD {
+        kept = without_outlier(brightest.radiance, next.x, surface.roughness);
+        excess = (brightest.radiance - kept) * brightest.weight;
     }
+    sums = with_sample(sums, kept, brightest.weight);
     let normalization = 1.0 / max(sums.radiance.w, 1e-6);
     let moments = sums.moments * normalization;
     var block: Block;
@@ -168,19 +149,13 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
     block.excess = excess * normalization;
     // Weights next to nothing say nothing, and some devices round them to 0.
     block.share = select(0.5, share.x / max(share.y, 1e-6), share.y > 1e-6);
-    var variance = max(moments.y - moments.x * moments.x, 0.0);
-    if ACCUMULATED {
-        // Variance over time where most pixels know it, else variance over the block.
-        variance = mix(variance, noise.x / max(noise.y, 1e-6), smoothstep(0.0, 0.5, noise.y * normalization));
-    }
-    block.deviation = sqrt(variance);
+    block.deviation = sqrt(max(moments.y - moments.x * moments.x, 0.0));
     if WHOLE_BLOCKS {
-        block.is_whole = least_weight >= WHOLE_WEIGHT && all(size == vec2<u32>(BLOCK_SIZE));
+        block.is_whole = shown == ALL_PIXELS;
     }
     if SAMPLES_ARE_USED {
-        let peaks = min(next, vec2<f32>(HALF_MAX));
-        let brightness_and_weight = vec2<f32>(moments.x, squared_weight * normalization * normalization);
-        textureStore(out_samples, block_index, vec4<u32>(pack2x16float(peaks), pack2x16float(brightness_and_weight), 0u, 0u));
+        let samples = Samples(next, moments.x, shown);
+        textureStore(out_samples, block_index, vec4<u32>(pack_samples(samples), 0u, 0u));
     }
     textureStore(out_blocks, block_index, pack_block(block));
 }

@@ -1,7 +1,7 @@
 //! Block statistics: smooths blocks over their neighbours, and notices where the light changed.
 //!
 //! in   blocks       rgba32uint    block   of the input
-//! in   samples      rg32uint      block   mean brightness, what one sample counts for
+//! in   samples      rg32uint      block   mean brightness, which pixels show the surface
 //! in   motion       any float     full    uv motion of the surface (light change, surface motion)
 //! in   prev_light   r32uint       block   last frame's `light`
 //! in   tiles, args   lists                tiles to denoise
@@ -89,7 +89,8 @@ fn block_statistics(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invo
     var moments = vec2<f32>(0.0);
     var sample_moments = vec2<f32>(0.0);
     var squared_weight = 0.0;
-    for (var i = 0; i < 9; i++) {
+    var i = 0;
+    loop {
         let offset = vec2<i32>(i % 3, i / 3) - 1;
         let at = clamp(center + offset, vec2<i32>(0), last);
         let tap = unpack_block(textureLoad(in_blocks, at, 0));
@@ -101,11 +102,16 @@ fn block_statistics(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invo
         let b = brightness(tap.radiance);
         moments += vec2<f32>(b, b * b) * w;
         if LIGHT_CHANGE {
-            // x: mean brightness, y: sum of squared weights. Blocks that show no reflection have none.
-            let samples = unpack2x16float(textureLoad(in_samples, at, 0).y);
-            let second_moment = tap.deviation * tap.deviation + samples.x * samples.x;
-            sample_moments += select(vec2<f32>(0.0), vec2<f32>(samples.x, second_moment) * w, tap.guide.denoised);
-            squared_weight += select(0.0, w * w * samples.y, tap.guide.denoised);
+            // Blocks that show no reflection have none.
+            let samples = unpack_samples(textureLoad(in_samples, at, 0).xy);
+            let mean = samples.brightness;
+            let second_moment = tap.deviation * tap.deviation + mean * mean;
+            sample_moments += select(vec2<f32>(0.0), vec2<f32>(mean, second_moment) * w, tap.guide.denoised);
+            squared_weight += select(0.0, w * w / f32(countOneBits(samples.shown)), tap.guide.denoised);
+        }
+        i += 1;
+        if i >= 9 {
+            break;
         }
     }
     let normalization = 1.0 / max(radiance.w, 1e-6);

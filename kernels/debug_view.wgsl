@@ -24,7 +24,7 @@ fn is_on_prev_screen(prev_uv: vec2<f32>) -> bool {
 
 // Disocclusion or candidate.
 fn history_color(pixel: vec2<u32>, guide: Guide) -> vec3<f32> {
-    let subject = subject_of(pixel, guide);
+    let subject = subject_of(pixel, guide, quad_of(pixel));
     let candidates = candidates_of(pixel, subject);
     let is_found = chosen(candidates, subject).is_valid;
     if VIEW == DISOCCLUSION {

@@ -9,8 +9,8 @@
 //! out  output        rgba16float   full    rgb: denoised radiance; a: variance of its brightness, 0..1
 //! out  prev_guide    r32uint       full    what the next frame wants to know of the G-buffer (G-buffer copy)
 //!
-//! Grid: one workgroup per listed tile or four listed blocks (indirect). Loads 4 blocks, and a history and a guide for
-//! each near tap.
+//! Grid: an invocation for each 2x2 pixels, which are between the same 4 blocks; one workgroup per 4 listed tiles or 16
+//! listed blocks (indirect). Loads those blocks and, for each pixel, a history and a guide for each near tap.
 //! Weights depend on the surface, on hit distance and on how settled tap and pixel are; on colour for mirrors only, as
 //! elsewhere bright samples are rare and that would darken.
 
@@ -81,28 +81,57 @@ struct BlockTap {
     variance: f32,
 }
 
-fn block_tap(block: vec2<i32>, plane: Plane, own_share: f32) -> BlockTap {
-    let tap = unpack_block(textureLoad(in_blocks, block, 0));
+fn block_tap(block: vec2<i32>, texel: vec4<u32>, plane: Plane, own_share: f32) -> BlockTap {
+    let tap = unpack_block(texel);
     let apart = (tap.share - own_share) * (1.0 / BLOCK_SHARE_TOLERANCE);
     let penalty = plane_penalty(plane, tap.guide, block_place(block)) + apart * apart;
     let fit = select(0.0, exp(-penalty), tap.guide.denoised);
     return BlockTap(vec4<f32>(tap.radiance, 1.0) * fit, select(0.0, tap.deviation * tap.deviation, tap.guide.denoised));
 }
 
-fn wide_of(fitting: vec4<f32>, variance: f32) -> Wide {
-    return Wide(fitting.rgb / max(fitting.a, 1e-6), fitting.a, variance);
+// Texels of the blocks that the pixels of a quad lie between.
+struct Corners {
+    top_left: vec4<u32>,
+    top_right: vec4<u32>,
+    bottom_left: vec4<u32>,
+    bottom_right: vec4<u32>,
 }
 
-fn blocks_around(pixel: vec2<u32>, plane: Plane, own_share: f32) -> Wide {
-    var fitting = vec4<f32>(0.0);
-    var variance = 0.0;
-    for (var i = 0u; i < 4u; i++) {
-        let corner = corner_of(pixel, i);
-        let tap = block_tap(corner.block, plane, own_share);
-        fitting += tap.fitting * corner.weight;
-        variance += tap.variance * corner.weight;
-    }
-    return wide_of(fitting, variance);
+fn corners_of(pixel: vec2<u32>) -> Corners {
+    return Corners(
+        textureLoad(in_blocks, corner_of(pixel, 0u).block, 0),
+        textureLoad(in_blocks, corner_of(pixel, 1u).block, 0),
+        textureLoad(in_blocks, corner_of(pixel, 2u).block, 0),
+        textureLoad(in_blocks, corner_of(pixel, 3u).block, 0),
+    );
+}
+
+// What a surface takes them for.
+struct BlockTaps {
+    top_left: BlockTap,
+    top_right: BlockTap,
+    bottom_left: BlockTap,
+    bottom_right: BlockTap,
+}
+
+fn block_taps(corners: Corners, pixel: vec2<u32>, plane: Plane, own_share: f32) -> BlockTaps {
+    return BlockTaps(
+        block_tap(corner_of(pixel, 0u).block, corners.top_left, plane, own_share),
+        block_tap(corner_of(pixel, 1u).block, corners.top_right, plane, own_share),
+        block_tap(corner_of(pixel, 2u).block, corners.bottom_left, plane, own_share),
+        block_tap(corner_of(pixel, 3u).block, corners.bottom_right, plane, own_share),
+    );
+}
+
+fn wide_at(pixel: vec2<u32>, taps: BlockTaps) -> Wide {
+    let after = between_blocks(pixel).fraction;
+    let before = 1.0 - after;
+    let w = vec4<f32>(before.x, after.x, before.x, after.x) * vec4<f32>(before.y, before.y, after.y, after.y);
+    let top = taps.top_left.fitting * w.x + taps.top_right.fitting * w.y;
+    let bottom = taps.bottom_left.fitting * w.z + taps.bottom_right.fitting * w.w;
+    let variances = vec4<f32>(taps.top_left.variance, taps.top_right.variance, taps.bottom_left.variance, taps.bottom_right.variance);
+    let fitting = top + bottom;
+    return Wide(fitting.rgb / max(fitting.a, 1e-6), fitting.a, dot(variances, w));
 }
 
 // Trust in what has been accumulated for few frames.
@@ -123,7 +152,7 @@ fn turned(direction: vec2<f32>) -> vec2<f32> {
 }
 
 // rgb: filtered radiance, exposed; a: variance of the accumulated brightness.
-fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
+fn filtered(pixel: vec2<u32>, guide: Guide, corners: Corners) -> vec4<f32> {
     let own = unpack_history(textureLoad(in_history, pixel, 0));
     let own_radiance = min(own.radiance * frame.exposure, vec3<f32>(HALF_MAX));
     let position = world_position(pixel, guide.depth);
@@ -132,7 +161,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let radius = vec2<f32>(footprint.along, footprint.across) * frame.filter_scale;
     var wide: Wide;
     if WIDE_FILTER {
-        wide = blocks_around(pixel, plane, own.share);
+        wide = wide_at(pixel, block_taps(corners, pixel, plane, own.share));
     }
 
     let sharp = 1.0 - smoothstep(SHARP_TO, SHARP_FROM, radius.x);
@@ -154,35 +183,42 @@ fn filtered(pixel: vec2<u32>, guide: Guide) -> vec4<f32> {
     let rho_y = vec2<f32>(footprint.axis.y, side.y) * falloff;
     var direction = vec2<f32>(1.0, 0.0);
     let by_blocks = smoothstep(WIDE_FROM, WIDE_TO, radius.x) * smoothstep(0.0, 0.3, wide.fit);
-    // Where blocks decide alone, taps would count for nothing.
-    let taps = select(NEAR_TAPS, 0u, by_blocks >= 1.0);
     // a: weight.
     var sum = vec4<f32>(0.0);
     // The largest luminance of taps, and the next.
     var brightest = 0.0;
     var next = 0.0;
-    for (var i = 0u; i < taps; i++) {
-        let offset = round(direction * (reach * sqrt(f32(i) + 1.0)));
-        direction = turned(direction);
-        let at = vec2<i32>(pixel) + vec2<i32>(offset);
-        let texel = clamp(at, vec2<i32>(0), vec2<i32>(frame.size) - 1);
-        let tap = load_guide(vec2<u32>(texel));
-        let history = unpack_history(textureLoad(in_history, texel, 0));
-        let radiance = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
-        let l = luminance(radiance);
-        let kept = radiance * min(1.0, glint / l);
-        let rho = offset.x * rho_x + offset.y * rho_y;
-        let apart = (history.share - own.share) * (1.0 / SHARE_TOLERANCE);
-        let brighter = brightness(radiance) - own_brightness;
-        let penalty = plane_penalty(plane, tap, vec2<f32>(texel) + 0.5) + apart * apart + noise_falloff * brighter * brighter;
-        // Without a length it is what `fill` left in a tile in which the guide may say anything.
-        let counts = tap.denoised && history.length > 0.0 && all(at == texel) && any(at != vec2<i32>(pixel));
-        let fit = exp(-penalty * difference) + least_fit;
-        let w = select(0.0, trust(history.length) * exp(-dot(rho, rho)) * fit, counts);
-        sum += vec4<f32>(select(vec3<f32>(0.0), kept, counts), 1.0) * w;
-        let counted = select(0.0, l, counts);
-        next = max(next, min(brightest, counted));
-        brightest = max(brightest, counted);
+    // Where blocks decide alone, taps would count for nothing.
+    let taps = select(NEAR_TAPS, 0u, by_blocks >= 1.0);
+    if taps != 0u {
+        var i = 0u;
+        loop {
+            i += 1u;
+            let offset = round(direction * (reach * sqrt(f32(i))));
+            direction = turned(direction);
+            let at = vec2<i32>(pixel) + vec2<i32>(offset);
+            let texel = clamp(at, vec2<i32>(0), vec2<i32>(frame.size) - 1);
+            let tap = load_guide(vec2<u32>(texel));
+            let history = unpack_history(textureLoad(in_history, texel, 0));
+            let radiance = min(history.radiance * frame.exposure, vec3<f32>(HALF_MAX));
+            let l = luminance(radiance);
+            let kept = radiance * min(1.0, glint / l);
+            let rho = offset.x * rho_x + offset.y * rho_y;
+            let apart = (history.share - own.share) * (1.0 / SHARE_TOLERANCE);
+            let brighter = brightness(radiance) - own_brightness;
+            let penalty = plane_penalty(plane, tap, vec2<f32>(texel) + 0.5) + apart * apart + noise_falloff * brighter * brighter;
+            // Without a length it is what `fill` left in a tile in which the guide may say anything.
+            let counts = tap.denoised && history.length > 0.0 && all(at == texel) && any(at != vec2<i32>(pixel));
+            let fit = exp(-penalty * difference) + least_fit;
+            let w = select(0.0, trust(history.length) * exp(-dot(rho, rho)) * fit, counts);
+            sum += vec4<f32>(select(vec3<f32>(0.0), kept, counts), 1.0) * w;
+            let counted = select(0.0, l, counts);
+            next = max(next, min(brightest, counted));
+            brightest = max(brightest, counted);
+            if i >= taps {
+                break;
+            }
+        }
     }
     // What stands out alone, or in a pair, has to last: above the other taps it counts as so many times as bright as
     // frames saw it.
@@ -211,18 +247,33 @@ fn store_result(pixel: vec2<u32>, result: vec4<f32>) {
     }
 }
 
-@compute @workgroup_size(8, 8)
-fn lobe_filter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
-    let pixel = listed_pixel(group, lane);
-    if any(pixel >= frame.size) {
-        return;
-    }
+fn filter_pixel(pixel: vec2<u32>, corners: Corners) {
     let guide = load_guide(pixel);
     var result: vec4<f32>;
     if guide.denoised {
-        result = without_exposure(filtered(pixel, guide));
+        result = without_exposure(filtered(pixel, guide, corners));
     } else {
         result = vec4<f32>(fallback_radiance(pixel, guide), 0.0);
     }
     store_result(pixel, result);
+}
+
+@compute @workgroup_size(64)
+fn lobe_filter(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
+    let first = listed_quad(group, lane);
+    if any(first >= frame.size) {
+        return;
+    }
+    var corners: Corners;
+    if WIDE_FILTER {
+        corners = corners_of(first);
+    }
+    var i = 0u;
+    loop {
+        filter_pixel(min(first + position_in_quad(i), frame.size - 1u), corners);
+        i += 1u;
+        if i >= QUAD_PIXELS {
+            break;
+        }
+    }
 }

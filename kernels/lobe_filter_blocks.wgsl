@@ -25,19 +25,15 @@ fn lobe_filter_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_in
     let outer = place * BLOCK_SIZE + quarter * 3u;
     let guide = load_guide(outer);
     let plane = pixel_plane_of(guide, world_position(outer, guide.depth));
-    let top_left = block_tap(corner_of(first, 0u).block, plane, own.share);
-    let top_right = block_tap(corner_of(first, 1u).block, plane, own.share);
-    let bottom_left = block_tap(corner_of(first, 2u).block, plane, own.share);
-    let bottom_right = block_tap(corner_of(first, 3u).block, plane, own.share);
-    for (var i = 0u; i < 4u; i++) {
-        let pixel = first + vec2<u32>(i & 1u, i >> 1u);
-        let after = between_blocks(pixel).fraction;
-        let before = 1.0 - after;
-        let w = vec4<f32>(before.x, after.x, before.x, after.x) * vec4<f32>(before.y, before.y, after.y, after.y);
-        let top = top_left.fitting * w.x + top_right.fitting * w.y;
-        let bottom = bottom_left.fitting * w.z + bottom_right.fitting * w.w;
-        let variances = vec4<f32>(top_left.variance, top_right.variance, bottom_left.variance, bottom_right.variance);
-        let wide = wide_of(top + bottom, dot(variances, w));
+    let taps = block_taps(corners_of(first), first, plane, own.share);
+    var i = 0u;
+    loop {
+        let pixel = first + position_in_quad(i);
+        let wide = wide_at(pixel, taps);
         store_result(pixel, without_exposure(vec4<f32>(wide.radiance, wide.variance)));
+        i += 1u;
+        if i >= QUAD_PIXELS {
+            break;
+        }
     }
 }

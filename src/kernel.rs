@@ -27,6 +27,7 @@ const SOURCES: &[(&str, &str)] = sources![
     "prefilter",
     "resolve_temporal",
     "block_average",
+    "block_average_accumulated",
     "block_statistics",
     "block_spread",
     "list_blocks",

@@ -27,6 +27,8 @@ pub(crate) const DEBUG_VIEW: &str = "debug_view";
 /// Averages over blocks of pixels, of which there are two.
 pub(crate) const BLOCKS: &str = "blocks";
 pub(crate) const OTHER_BLOCKS: &str = "other_blocks";
+/// Those that the next pass over blocks writes, in templates of passes that write a part of them ahead.
+pub(crate) const NEXT_BLOCKS: &str = "next blocks";
 
 /// Variable of the denoised image in the kernels that write it.
 pub(crate) const OUTPUT_VARIABLE: &str = "out_output";
@@ -74,8 +76,10 @@ pub(crate) enum GridTemplate {
     Tiles(u32),
     /// A list of `args`.
     List(u64),
-    /// The list of tiles, by pixel; where there are lists of blocks, those of them that are not whole.
-    Pixels,
+    /// The list of tiles, by quad of 2x2 pixels; where there are lists of blocks, those of them that are not whole.
+    Quads,
+    /// The list of tiles, by block; where there are lists of blocks, those of them that are not whole.
+    OtherBlocks,
     /// A list of `block_args`.
     Blocks(u64),
 }
@@ -232,6 +236,7 @@ const ACCUMULATE_BINDINGS: &[(&str, &str, Copy)] = &[
     ("in_block_list", "block_list", Current),
     ("in_block_args", "block_args", Current),
     ("out_history", "history", Current),
+    ("out_blocks", NEXT_BLOCKS, Current),
 ];
 
 const LOBE_FILTER_BINDINGS: &[(&str, &str, Copy)] = &[
@@ -253,7 +258,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
     PassTemplate {
         name: "block_average",
         kernel: "block_average",
-        is_needed: has_input_blocks,
+        is_needed: has_blocks,
         stage: Stage::Denoise,
         grid: GridTemplate::List(3),
         overrides: &["OUTLIER_SPREAD", "SAMPLES_ARE_USED", "WHOLE_BLOCKS"],
@@ -268,7 +273,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
     PassTemplate {
         name: "block_statistics",
         kernel: "block_statistics",
-        is_needed: has_input_blocks,
+        is_needed: has_block_statistics,
         stage: Stage::Denoise,
         grid: GridTemplate::List(3),
         overrides: &["LIGHT_CHANGE", "SURFACE_MOTION"],
@@ -327,7 +332,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "accumulate",
         is_needed: always,
         stage: Stage::Denoise,
-        grid: GridTemplate::Pixels,
+        grid: GridTemplate::Quads,
         overrides: &[
             "MIRROR_PARALLAX",
             "SURFACE_MOTION",
@@ -391,15 +396,19 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
     },
     PassTemplate {
         name: "block_average_accumulated",
-        kernel: "block_average",
+        kernel: "block_average_accumulated",
         is_needed: has_wide_filter,
         stage: Stage::Denoise,
-        grid: GridTemplate::List(3),
-        overrides: &["ACCUMULATED"],
+        grid: GridTemplate::OtherBlocks,
+        overrides: &["WHOLE_BLOCKS"],
         bindings: &[
             ("in_history", "history", Current),
+            ("in_blocks", BLOCKS, Current),
+            ("in_samples", "samples", Current),
             ("in_tiles", "tiles", Current),
             ("in_args", "args", Current),
+            ("in_block_list", "block_list", Current),
+            ("in_block_args", "block_args", Current),
             ("out_blocks", BLOCKS, Current),
         ],
     },
@@ -423,7 +432,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         kernel: "lobe_filter",
         is_needed: always,
         stage: Stage::Denoise,
-        grid: GridTemplate::Pixels,
+        grid: GridTemplate::Quads,
         overrides: &["FALLBACK", "NEAR_TAPS", "WIDE_FILTER", "WHOLE_BLOCKS"],
         bindings: LOBE_FILTER_BINDINGS,
     },
@@ -450,8 +459,13 @@ fn always(_: &Settings) -> bool {
     true
 }
 
-/// Whether a pass uses averages over blocks of the input.
-fn has_input_blocks(settings: &Settings) -> bool {
+/// Whether a pass uses blocks.
+fn has_blocks(settings: &Settings) -> bool {
+    has_block_statistics(settings) || has_wide_filter(settings)
+}
+
+/// Whether a pass uses averages of the input over blocks.
+fn has_block_statistics(settings: &Settings) -> bool {
     settings.features.compares_with_blocks() || settings.features.light_change
 }
 
@@ -518,10 +532,10 @@ pub(crate) fn all_resources() -> Vec<Resource> {
         resource("tiles", buffer(4, Count::Per(Extent::Tile), false), Lifetime::Transient, false),
         resource("rays", buffer(4, Count::Per(Extent::Full), false), Lifetime::Transient, false),
         resource("counters", buffer(4, Count::Fixed(4), false), Lifetime::Persistent, false),
-        resource("args", buffer(16, Count::Fixed(4), true), Lifetime::Transient, false),
+        resource("args", buffer(16, Count::Fixed(5), true), Lifetime::Transient, false),
         resource("block_list", buffer(4, Count::Per(Extent::Block), false), Lifetime::Transient, false),
         resource("block_counters", buffer(4, Count::Fixed(2), false), Lifetime::Persistent, false),
-        resource("block_args", buffer(16, Count::Fixed(3), true), Lifetime::Transient, false),
+        resource("block_args", buffer(16, Count::Fixed(4), true), Lifetime::Transient, false),
     ]
 }
 
@@ -559,10 +573,7 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         "NORMAL_IS_INPUT" => f64::from(features.normal_input),
         "AVERAGE_IS_USED" => f64::from(settings.pipeline == Pipeline::Published && features.uses_average()),
         "PREV_GUIDE_IS_KEPT" => f64::from(settings.pipeline == Pipeline::Footprint && features.gbuffer_copy),
-        "BLOCKS_ARE_USED" => {
-            let has_blocks = has_input_blocks(settings) || has_wide_filter(settings);
-            f64::from(settings.pipeline == Pipeline::Footprint && has_blocks)
-        }
+        "BLOCKS_ARE_USED" => f64::from(settings.pipeline == Pipeline::Footprint && has_blocks(settings)),
         "GUIDE_IS_COMPLETE" => f64::from(is_guide_complete(settings)),
         "GUIDE_IS_CLEARED" => f64::from(is_guide_packed(settings) && !is_guide_complete(settings)),
         "FALLBACK_IS_BLACK" => f64::from(settings.coverage.fallback == Fallback::Black),
@@ -572,7 +583,7 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         "OUTLIER_SPREAD" => f64::from(features.outlier_spread),
         "BLOCK_STATISTICS" => f64::from(features.compares_with_blocks()),
         "BLOCK_TAPS" => f64::from(if features.block_interpolation { 4 } else { 1 }),
-        "SAMPLES_ARE_USED" => f64::from(features.light_change || features.outlier_spread),
+        "SAMPLES_ARE_USED" => f64::from(features.light_change || features.outlier_spread || has_wide_filter(settings)),
         "NEAR_TAPS" => f64::from(if features.spatial_filter { features.near_taps } else { 0 }),
         "WIDE_TAPS" => f64::from(features.wide_taps),
         "WHOLE_BLOCKS" => f64::from(has_whole_blocks(settings)),

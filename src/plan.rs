@@ -10,8 +10,8 @@ use crate::Error;
 use crate::frame::check_allocation;
 use crate::kernel::{self, Kernel, Overrides, Sources};
 use crate::passes::{
-    ARGS_STRIDE, BLOCKS, EXPORTED, GBUFFER_OVERRIDES, GridTemplate, OTHER_BLOCKS, OUTPUT_VARIABLE, PassTemplate,
-    SHARED_BINDINGS, all_resources, has_whole_blocks, override_value, resource_of, templates,
+    ARGS_STRIDE, BLOCKS, EXPORTED, GBUFFER_OVERRIDES, GridTemplate, NEXT_BLOCKS, OTHER_BLOCKS, OUTPUT_VARIABLE,
+    PassTemplate, SHARED_BINDINGS, all_resources, has_whole_blocks, override_value, resource_of, templates,
 };
 use crate::resource::Copy::{self, Previous};
 use crate::resource::{Access, Kind, Lifetime, Resource, TILE_SIZE};
@@ -111,12 +111,14 @@ impl Turns {
         if bindings.iter().any(|bound| bound.resource == OTHER_BLOCKS) {
             return;
         }
-        for bound in bindings.iter_mut().filter(|bound| bound.resource == BLOCKS) {
-            let writes = bound.access.writes();
-            if writes != last {
-                bound.resource = OTHER_BLOCKS.to_owned();
+        for bound in bindings {
+            let is_ahead = bound.resource == NEXT_BLOCKS;
+            if !is_ahead && bound.resource != BLOCKS {
+                continue;
             }
-            self.other ^= writes;
+            let writes = bound.access.writes();
+            bound.resource = if writes == last { BLOCKS } else { OTHER_BLOCKS }.to_owned();
+            self.other ^= writes && !is_ahead;
         }
     }
 }
@@ -161,8 +163,10 @@ fn plan_pass<K: AsRef<Kernel>>(
         GridTemplate::Tiles(tiles) => Grid::Squares { side: tiles * TILE_SIZE },
         GridTemplate::List(index) => list("args", index),
         GridTemplate::Blocks(index) => list("block_args", index),
-        GridTemplate::Pixels if has_whole_blocks(settings) => list("block_args", 0),
-        GridTemplate::Pixels => list("args", 0),
+        GridTemplate::Quads if has_whole_blocks(settings) => list("block_args", 0),
+        GridTemplate::Quads => list("args", 4),
+        GridTemplate::OtherBlocks if has_whole_blocks(settings) => list("block_args", 3),
+        GridTemplate::OtherBlocks => list("args", 3),
     };
     let (name, kernel_name) = (template.name.to_owned(), template.kernel.to_owned());
     let pass = Pass { name, kernel: kernel_name, stage: template.stage, overrides, grid, bindings };

@@ -246,8 +246,14 @@ fn a_gbuffer_read_where_it_is_says_what_a_kept_one_says() {
         let mut case = Case::still(SIZE, 6, |frame, p| {
             let value = 0.5 + noise(frame, p);
             let tilt = [0.3 * noise(7, p / 16), 0.1, 1.0];
+            // Where the ray of the pixel meets the plane of that normal that is 4 ahead, so that no pixel is next to
+            // showing the surface of its block.
+            let [x, y] = [p.x, p.y].map(|i| 2.0 * (i as f32 + 0.5));
+            let half_side = 0.5_f32.tan();
+            let ray = [(x - SIZE.x as f32), (SIZE.y as f32 - y)].map(|side| side * half_side / SIZE.y as f32);
+            let plane = 4.0 / (1.0 - tilt[0] * ray[0] - tilt[1] * ray[1]);
             // Blocks of sky, and of surfaces beyond the threshold.
-            let depth = if noise(9, p / 8) < 0.1 { 0.0 } else { 4.0 };
+            let depth = if noise(9, p / 8) < 0.1 { 0.0 } else { plane };
             let roughness = noise(8, p / 12);
             Pixel { radiance: [value, 0.5 * value, 0.25, 3.0], normal: tilt, roughness, depth, ..Pixel::WALL }
         });

@@ -75,6 +75,28 @@ fn unpack_block(texel: vec4<u32>) -> Block {
     return block;
 }
 
+// What is known of the samples of a block beside their mean.
+struct Samples {
+    // The second and third largest luminance.
+    peaks: vec2<f32>,
+    // Mean brightness.
+    brightness: f32,
+    // A bit for each pixel that shows the surface of the block, row by row.
+    shown: u32,
+}
+
+// All of them do.
+const ALL_PIXELS: u32 = 0xffffu;
+
+fn pack_samples(samples: Samples) -> vec2<u32> {
+    let peaks = min(samples.peaks, vec2<f32>(HALF_MAX));
+    return vec2<u32>(pack2x16float(peaks), pack2x16float(vec2<f32>(samples.brightness, 0.0)) | (samples.shown << 16u));
+}
+
+fn unpack_samples(packed: vec2<u32>) -> Samples {
+    return Samples(unpack2x16float(packed.x), unpack2x16float(packed.y & 0xffffu).x, packed.y >> 16u);
+}
+
 // The largest indices of blocks on screen.
 fn last_block() -> vec2<i32> {
     return vec2<i32>((frame.size - 1u) / BLOCK_SIZE);

@@ -42,15 +42,9 @@ fn list_index(group: vec3<u32>) -> u32 {
     return group.y * LIST_GRID_WIDTH + group.x;
 }
 
-// Blocks of their list that a workgroup of 64 invocations handles in passes over pixels of listed blocks.
-const BLOCKS_PER_GROUP: u32 = 4u;
-// And in passes over their quads of 2x2 pixels.
+// Tiles and blocks of their lists that a workgroup of 64 invocations handles in passes over their quads of 2x2 pixels.
+const TILES_PER_GROUP_OF_QUADS: u32 = 4u;
 const BLOCKS_PER_GROUP_OF_QUADS: u32 = 16u;
-
-// Position in its list of the block that an invocation handles a pixel of.
-fn listed_block_index(group: vec3<u32>, lane: u32) -> u32 {
-    return list_index(group) * BLOCKS_PER_GROUP + lane / 16u;
-}
 
 // Workgroups in x, y and z that handle a list, and its length.
 fn list_grid(groups: u32, length: u32) -> vec4<u32> {
@@ -58,9 +52,23 @@ fn list_grid(groups: u32, length: u32) -> vec4<u32> {
     return vec4<u32>(min(groups, LIST_GRID_WIDTH), rows, 1u, length);
 }
 
-// Position inside a 4x4 block of an invocation.
-fn position_in_block(lane: u32) -> vec2<u32> {
-    return vec2<u32>(lane & 3u, (lane >> 2u) & 3u);
+const BLOCK_PIXELS: u32 = 16u;
+
+// How many pixels of rows that are on screen a block has, those beside the screen among them.
+fn block_pixels(corner: vec2<u32>) -> u32 {
+    return 4u * min(frame.size.y - corner.y, 4u);
+}
+
+// Position of a pixel inside a 4x4 block.
+fn position_in_block(index: u32) -> vec2<u32> {
+    return vec2<u32>(index & 3u, (index >> 2u) & 3u);
+}
+
+const QUAD_PIXELS: u32 = 4u;
+
+// Position of a pixel inside a quad.
+fn position_in_quad(index: u32) -> vec2<u32> {
+    return vec2<u32>(index & 1u, index >> 1u);
 }
 
 // Position inside an 8x8 tile of an invocation.
