@@ -73,9 +73,9 @@ const ONE_BY_SURFACE_FROM: f32 = 0.1;
 // A sample so many times as bright as its surroundings has hit what few rays hit: that its hit distance is another
 // than history's is no reason to forget history.
 const RARE: f32 = 2.0;
-// Weight of a mirror's own sample among the 4x4 that bound its history, and roughness from which it has none extra:
+// Weight of a mirror's own sample against the window that bounds its history, and roughness from which it has none extra:
 // lamps in mirrors have edges, and the deviation across an edge bounds nothing.
-const MIRROR_WEIGHT: f32 = 36.0;
+const MIRROR_WEIGHT: f32 = 2.25;
 const MIRROR_UP_TO: f32 = 0.03;
 
 // Outliers of which there are two count up to so many times what bounds single ones, against the third sample of their
@@ -212,11 +212,14 @@ fn misfit(history: vec3<f32>, around: Surroundings) -> f32 {
     return (d.x + d.y + d.z) / (around.deviation + 0.02);
 }
 
-// Squeezed radiance of the 4x4 pixels around a quad.
+// Weights of the pixels of a window together.
+const WINDOW_WEIGHT: f32 = 64.0;
+
+// Squeezed radiance of the 4x4 pixels around a quad, those of the quad most.
 struct Window {
     is_known: bool,
-    sum: vec3<f32>,
-    squares: vec3<f32>,
+    mean: vec3<f32>,
+    mean_square: vec3<f32>,
 }
 
 // Looked at once for all pixels of a quad, whose first is `pixel`, if one is smooth.
@@ -225,10 +228,14 @@ fn window_around(pixel: vec2<u32>, is_wanted: bool, known: Window) -> Window {
     let count = select(0u, BLOCK_PIXELS, is_wanted && !known.is_known);
     let corner = vec2<i32>(pixel) - 1;
     for (var i = 0u; i < count; i++) {
-        let at = clamp(corner + vec2<i32>(position_in_block(i)), vec2<i32>(0), vec2<i32>(frame.size) - 1);
+        let place = position_in_block(i);
+        let at = clamp(corner + vec2<i32>(place), vec2<i32>(0), vec2<i32>(frame.size) - 1);
         let c = squeezed(load_radiance(vec2<u32>(at)));
-        window.sum += c;
-        window.squares += c * c;
+        // 1 at the sides, 3 within.
+        let w = vec2<f32>(1u + ((place + 1u) & vec2<u32>(2u)));
+        let share = w.x * w.y / WINDOW_WEIGHT;
+        window.mean += c * share;
+        window.mean_square += c * c * share;
     }
     window.is_known = known.is_known || is_wanted;
     return window;
@@ -238,9 +245,9 @@ fn window_around(pixel: vec2<u32>, is_wanted: bool, known: Window) -> Window {
 fn clipped(history: vec3<f32>, own: vec3<f32>, window: Window, roughness: f32) -> vec3<f32> {
     let weight = MIRROR_WEIGHT * (1.0 - smoothstep(0.0, MIRROR_UP_TO, roughness));
     let c_own = squeezed(own);
-    let normalization = 1.0 / (f32(BLOCK_PIXELS) + weight);
-    let mean = (window.sum + c_own * weight) * normalization;
-    let variance = max((window.squares + c_own * c_own * weight) * normalization - mean * mean, vec3<f32>(0.0));
+    let normalization = 1.0 / (1.0 + weight);
+    let mean = (window.mean + c_own * weight) * normalization;
+    let variance = max((window.mean_square + c_own * c_own * weight) * normalization - mean * mean, vec3<f32>(0.0));
     let extent = sqrt(variance) * frame.accumulate_clip_scale + 0.02;
     let c = clamp(squeezed(history), max(mean - extent, vec3<f32>(0.0)), min(mean + extent, vec3<f32>(0.9999)));
     return c / (1.0 - c);
