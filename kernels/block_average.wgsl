@@ -127,7 +127,7 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
         count += select(0u, 1u, counts);
         shown |= select(0u, 1u << i, w >= SHOWN_WEIGHT);
         i += 1u;
-        if i >= block_pixels(corner) {
+        if i >= pixels_of_blocks() {
             break;
         }
     }

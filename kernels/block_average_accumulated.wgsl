@@ -53,7 +53,7 @@ fn block_average_accumulated(@builtin(workgroup_id) group: vec3<u32>, @builtin(l
         share += history.share * w;
         noise += select(vec2<f32>(0.0), vec2<f32>(history.noise, 1.0) * w, history.noise >= 0.0);
         i += 1u;
-        if i >= block_pixels(corner) {
+        if i >= pixels_of_blocks() {
             break;
         }
     }

@@ -72,8 +72,7 @@ fn block_spread(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     // Of luminance times weight.
     var squares = 0.0;
     var grid = -far;
-    var i = 0;
-    loop {
+    for (var i = 0; i < taps; i++) {
         let offset = round(along * grid.x + across * grid.y);
         let is_end = grid.x >= far.x;
         grid = vec2<f32>(select(grid.x + 1.0, -far.x, is_end), select(grid.y, grid.y + 1.0, is_end));
@@ -91,10 +90,6 @@ fn block_spread(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
             sum += vec4<f32>(tap.excess, 1.0) * w;
             let l = luminance(tap.excess) * w;
             squares += l * l;
-        }
-        i += 1;
-        if i >= taps {
-            break;
         }
     }
     let mean = sum.rgb / max(sum.w, 1e-6);
