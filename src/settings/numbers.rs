@@ -140,10 +140,10 @@ numeric_settings! {
         max_history_seconds = 0.5, 0.0 to 10.0;
         /// Longest history on mirrors, in seconds. Between 1 and 31 frames.
         mirror_history_seconds = 0.13, 0.0 to 10.0;
-        /// Perceptual roughness below which history is clipped to the 3x3 pixels, and from which on it may be as long
+        /// Perceptual roughness below which history is clipped to the pixels around, and from which on it may be as long
         /// as `max_history_seconds`.
         clip_roughness = 0.15, 0.001 to 1.0;
-        /// Half size of what it is clipped to, in deviations of the 3x3 pixels.
+        /// Half size of what it is clipped to, in deviations of the pixels around.
         clip_scale = 1.3, 0.0 to 1000.0;
         /// A sample is an outlier beyond so many times the brightest other one of its 4x4 pixels.
         outlier_factor = 6.0, 1.0 to 65504.0;
