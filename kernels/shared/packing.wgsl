@@ -86,14 +86,10 @@ fn unpack_radiance(packed: vec2<u32>) -> vec4<f32> {
     return vec4<f32>(unpack2x16float(packed.x), unpack2x16float(packed.y));
 }
 
-// The nearest half floats of numbers from 0 to HALF_MAX, even ones between two. Storing to a half float texture may round
-// towards zero instead, and does on some drivers: kept as history, that darkens frame by frame.
+// The nearest half floats. Storing to a half float texture may round towards zero instead, and does on some
+// drivers: kept as history, that darkens frame by frame.
 fn rounded_to_half(v: vec4<f32>) -> vec4<f32> {
-    let bits = bitcast<vec4<u32>>(v);
-    let odd = (bits >> vec4<u32>(13u)) & vec4<u32>(1u);
-    let rounded = bitcast<vec4<f32>>((bits + 0xfffu + odd) & vec4<u32>(0xffffe000u));
-    // Half floats below 2^-14 are multiples of 2^-24.
-    return select(rounded, round(v * 16777216.0) * (1.0 / 16777216.0), v < vec4<f32>(6.1035156e-5));
+    return vec4<f32>(unpack2x16float(pack2x16float(v.xy)), unpack2x16float(pack2x16float(v.zw)));
 }
 
 // Reprojected history: radiance in three half floats, history length and variance in 8 bits each.
