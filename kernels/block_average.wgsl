@@ -101,8 +101,7 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
     var share = vec2<f32>(0.0);
     // A bit for each pixel that shows the surface.
     var shown = 0u;
-    var i = 0u;
-    loop {
+    for (var i = 0u; i < pixels_in_rows(corner); i++) {
         let wanted = corner + position_in_block(i);
         let pixel = min(wanted, frame.size - 1u);
         let guide = load_guide(pixel);
@@ -126,10 +125,6 @@ fn block_average(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocat
         share += select(vec2<f32>(0.0), vec2<f32>(hit_share(distance, camera_distance), 1.0) * w, distance > 0.0);
         count += select(0u, 1u, counts);
         shown |= select(0u, 1u << i, w >= SHOWN_WEIGHT);
-        i += 1u;
-        if i >= pixels_of_blocks() {
-            break;
-        }
     }
     // A sample on its own is above no other.
     next.x = select(next.x, brightest.luminance, count < 2u);

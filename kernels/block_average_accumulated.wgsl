@@ -6,8 +6,8 @@
 //! in   tiles, args   lists                 tiles to denoise, or blocks (whole blocks)
 //! out  blocks        rgba32uint    block   surface, mean radiance, hit share; deviation over time, or over the block
 //!
-//! Grid: one invocation a block, workgroups of the blocks of 16 listed tiles or of 64 listed blocks (indirect). Each pixel is
-//! read once. Whole blocks are not among them: `accumulate_blocks` writes theirs.
+//! Grid: one invocation a block, workgroups of the blocks of 16 listed tiles or of 64 listed blocks (indirect). Each pixel
+//! is read once. Whole blocks are not among them: `accumulate_blocks` writes theirs.
 
 import package::shared::frame;
 import package::shared::packing;
@@ -41,8 +41,7 @@ fn block_average_accumulated(@builtin(workgroup_id) group: vec3<u32>, @builtin(l
     var share = 0.0;
     // y: how many know it.
     var noise = vec2<f32>(0.0);
-    var i = 0u;
-    loop {
+    for (var i = 0u; i < pixels_in_rows(corner); i++) {
         let pixel = min(corner + position_in_block(i), frame.size - 1u);
         let history = unpack_history(textureLoad(in_history, pixel, 0));
         let w = f32((shown >> i) & 1u);
@@ -52,10 +51,6 @@ fn block_average_accumulated(@builtin(workgroup_id) group: vec3<u32>, @builtin(l
         moments += vec2<f32>(b, b * b) * w;
         share += history.share * w;
         noise += select(vec2<f32>(0.0), vec2<f32>(history.noise, 1.0) * w, history.noise >= 0.0);
-        i += 1u;
-        if i >= pixels_of_blocks() {
-            break;
-        }
     }
     let normalization = 1.0 / radiance.a;
     moments *= normalization;

@@ -54,10 +54,9 @@ fn list_grid(groups: u32, length: u32) -> vec4<u32> {
 
 const BLOCK_PIXELS: u32 = 16u;
 
-// How many pixels of a block, row by row, there are to look at: the same for all blocks, but no constant, for which RADV
-// would unroll loops over them.
-fn pixels_of_blocks() -> u32 {
-    return 4u * min(frame.size.y, 4u);
+// How many pixels a block has in rows that are on screen.
+fn pixels_in_rows(corner: vec2<u32>) -> u32 {
+    return 4u * min(frame.size.y - corner.y, 4u);
 }
 
 // Position of a pixel inside a 4x4 block.
