@@ -160,6 +160,8 @@ fn memory_stays_within_the_published_figure() {
     // 32.25 at most with all that is kept of last frame's G-buffer.
     let (plan, _) = Plan::new(&Settings::default(), SIZE).unwrap();
     assert!(plan.bytes_per_pixel() <= 32.25, "{}", plan.bytes_per_pixel());
+    let (fast, _) = Plan::new(&Preset::Fast.settings(), SIZE).unwrap();
+    assert!(fast.bytes_per_pixel() <= 24.25, "{}", fast.bytes_per_pixel());
     assert_eq!(plan.output(), Some(("history", limpid::resource::Copy::Previous)));
     let memory = plan.memory();
     assert_eq!(memory.total(), plan.resources.iter().map(|r| r.bytes(SIZE)).sum::<u64>());

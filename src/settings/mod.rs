@@ -20,7 +20,7 @@ use crate::Error;
 pub enum Preset {
     /// The recommendation, for surfaces of every roughness.
     Default,
-    /// The same with fewer taps and one history, for tight budgets.
+    /// The same with fewer taps, one history and three quarters of the memory, for tight budgets.
     Fast,
     /// The pipeline that AMD published in 2021, with the constants it was published with, for a ray a pixel.
     Reference,
@@ -41,6 +41,8 @@ impl Preset {
                 settings.features.wide_taps = 2;
                 settings.features.both_histories = false;
                 settings.features.block_interpolation = false;
+                // Few taps decode what they need for less than it takes to store and load it.
+                settings.features.packed_guide = false;
                 settings
             }
             Preset::Reference => {
