@@ -19,7 +19,7 @@ override ACCUMULATED: bool = false;
 override WIDE_TAPS: i32 = 4;
 
 // Of how many equally bright blocks the excess has to be the mean to be believed by half.
-const EXCESS_DOUBT: f32 = 1.4;
+const EXCESS_DOUBT: f32 = 2.0;
 // Neighbouring blocks hold the same outliers: after the mean over 3x3 blocks, so many of them. Blocks further apart hold
 // others, and count for more.
 const BLOCKS_OF_OUTLIER: f32 = 8.0;

@@ -38,10 +38,10 @@ override WIDE_FILTER: bool = true;
 
 // Least half axes, in pixels, over which the weight of near taps falls.
 const NEAR_LEAST: f32 = 1.7;
-// Most pixels that near taps reach. The least grows with their number, so that few of them meet in a pixel.
-const NEAR_MOST: f32 = 3.0;
-const NEAR_LEAST_REACH: f32 = 1.4;
+// Pixels that near taps reach. That grows with their number, so that few of them meet in a pixel.
+const NEAR_REACH: f32 = 1.4;
 const REACH_OF_TAP: f32 = 0.05;
+const NEAR_MOST: f32 = 3.0;
 // The variance of what was accumulated for few frames is high and taps may fit worse: differences count for a share of
 // what they do, for a frame and for each one more, and what fits no tap takes a little of all. How far the filter reaches
 // does not depend on frames.
@@ -53,6 +53,9 @@ const PIXEL_NORMAL_TOLERANCE: f32 = 0.02;
 // Half axis of the filter, in pixels, from and to which blocks take over.
 const WIDE_FROM: f32 = 0.7;
 const WIDE_TO: f32 = 2.5;
+// How well they have to fit for that, from and to.
+const WIDE_FIT_FROM: f32 = 0.2;
+const WIDE_FIT_TO: f32 = 0.6;
 // Half axis below which, and from which no longer, taps may differ by noise alone.
 const SHARP_TO: f32 = 0.3;
 const SHARP_FROM: f32 = 0.7;
@@ -139,13 +142,6 @@ fn trust(length: f32) -> f32 {
     return 0.2 + 0.8 * min(1.0, length * 0.25);
 }
 
-fn pixel_plane_of(guide: Guide, position: vec3<f32>) -> Plane {
-    let lobe = 1.0 / max(alpha_of(guide.roughness), PIXEL_NORMAL_TOLERANCE);
-    var plane = plane_of(guide, position);
-    plane.normal_scale = lobe * lobe;
-    return plane;
-}
-
 // Vogel's disk: each tap is turned against the one before by the golden angle.
 fn turned(direction: vec2<f32>) -> vec2<f32> {
     return vec2<f32>(direction.x * -0.737368878 - direction.y * 0.675490294, direction.x * 0.675490294 - direction.y * 0.737368878);
@@ -156,7 +152,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide, corners: Corners) -> vec4<f32> {
     let own = unpack_history(textureLoad(in_history, pixel, 0));
     let own_radiance = min(own.radiance * frame.exposure, vec3<f32>(HALF_MAX));
     let position = world_position(pixel, guide.depth);
-    let plane = pixel_plane_of(guide, position);
+    let plane = plane_within(guide, position, PIXEL_NORMAL_TOLERANCE);
     let footprint = lobe_footprint(position, guide, own.share);
     let radius = vec2<f32>(footprint.along, footprint.across) * frame.filter_scale;
     var wide: Wide;
@@ -165,7 +161,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide, corners: Corners) -> vec4<f32> {
     }
 
     let sharp = 1.0 - smoothstep(SHARP_TO, SHARP_FROM, radius.x);
-    let noise_falloff = NOISE_FALLOFF * sharp / (wide.variance + 1e-5);
+    let noise_falloff = sharp * (NOISE_FALLOFF / (wide.variance + 1e-5));
     let is_noisy = guide.roughness >= OUTLIER_ROUGHNESS;
     let difference = select(1.0, min(1.0, YOUNG_DIFFERENCE + DIFFERENCE_OF_FRAME * (own.length - 1.0)), is_noisy);
     let least_fit = select(0.0, YOUNG_FIT / (own.length * own.length), is_noisy);
@@ -173,16 +169,15 @@ fn filtered(pixel: vec2<u32>, guide: Guide, corners: Corners) -> vec4<f32> {
     let glint = (GLINT_LIMIT * luminance(own_radiance) + GLINT_FLOOR) * max(1.0, glint_axes * glint_axes)
         * max(1.0, GLINT_FRAMES / own.length);
     let own_brightness = brightness(own_radiance);
-    let least_reach = min(NEAR_LEAST_REACH + REACH_OF_TAP * f32(NEAR_TAPS), NEAR_MOST);
     // A disk, of which weights make an ellipse: no axis decides between two pixels.
-    let reach = clamp(radius.x, least_reach, NEAR_MOST) * inverseSqrt(max(f32(NEAR_TAPS), 1.0));
+    let reach = min(NEAR_REACH + REACH_OF_TAP * f32(NEAR_TAPS), NEAR_MOST) * inverseSqrt(max(f32(NEAR_TAPS), 1.0));
     // From pixels to half axes.
     let falloff = 1.0 / max(radius, vec2<f32>(NEAR_LEAST));
     let side = side_of(footprint.axis);
     let rho_x = vec2<f32>(footprint.axis.x, side.x) * falloff;
     let rho_y = vec2<f32>(footprint.axis.y, side.y) * falloff;
     var direction = vec2<f32>(1.0, 0.0);
-    let by_blocks = smoothstep(WIDE_FROM, WIDE_TO, radius.x) * smoothstep(0.0, 0.3, wide.fit);
+    let by_blocks = smoothstep(WIDE_FROM, WIDE_TO, radius.x) * smoothstep(WIDE_FIT_FROM, WIDE_FIT_TO, wide.fit);
     // a: weight.
     var sum = vec4<f32>(0.0);
     // The largest luminance of taps, and the next.

@@ -24,7 +24,7 @@ fn lobe_filter_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_in
     // The surface next to the other blocks: what they are to it, it is to them.
     let outer = place * BLOCK_SIZE + quarter * 3u;
     let guide = load_guide(outer);
-    let plane = pixel_plane_of(guide, world_position(outer, guide.depth));
+    let plane = plane_within(guide, world_position(outer, guide.depth), PIXEL_NORMAL_TOLERANCE);
     let taps = block_taps(corners_of(first), first, plane, own.share);
     var i = 0u;
     loop {

@@ -193,9 +193,11 @@ fn what_was_found_before() {
 
 /// Moving, noisy surfaces of all kinds, as the teeth of the comparison bite into.
 fn lively(preset: Preset) -> Spec {
+    // Filters that reach over noise average it, whatever their width; edges show it.
+    let edges = Field::Blocks(7, 0.1, 3.0);
     let frame = |seed| FrameSpec {
         seed,
-        radiance: Field::Noise(0.1, 3.0),
+        radiance: if preset == Preset::Default { edges } else { Field::Noise(0.1, 3.0) },
         hit_distance: Field::Noise(0.5, 5.0),
         depth: Field::Blocks(11, 3.0, 4.0),
         roughness: Field::Gradient(0.0, 1.0),

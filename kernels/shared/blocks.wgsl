@@ -24,6 +24,10 @@ struct Block {
     is_whole: bool,
 }
 
+// Bits of each channel of a block's radiance, as of rgb9e5, and of its excess, which leaves 6 for its certainty.
+const RADIANCE_BITS: u32 = 9u;
+const EXCESS_BITS: u32 = 7u;
+
 // A little above a half: means of equal half floats, which have two bits more, are often just between two codes, where
 // else the last bit of a sum, which differs between devices, would decide.
 const ROUNDING: f32 = 0.50390625;
@@ -54,8 +58,8 @@ fn pack_block(block: Block) -> vec4<u32> {
     return vec4<u32>(
         select(0u, depth | deviation, block.guide.denoised),
         oct.x | (oct.y << 9u) | (roughness << 18u) | (share << 24u),
-        pack_shared_exponent(block.radiance, 9u),
-        pack_shared_exponent(block.excess, 7u) | (certainty << 26u),
+        pack_shared_exponent(block.radiance, RADIANCE_BITS),
+        pack_shared_exponent(block.excess, EXCESS_BITS) | (certainty << 26u),
     );
 }
 
@@ -68,8 +72,8 @@ fn unpack_block(texel: vec4<u32>) -> Block {
     block.guide.denoised = texel.x != 0u;
     block.share = f32(texel.y >> 24u) * (1.0 / 255.0);
     block.deviation = f32(texel.x & 255u) * (1.0 / 255.0);
-    block.radiance = unpack_shared_exponent(texel.z, 9u);
-    block.excess = unpack_shared_exponent(texel.w, 7u);
+    block.radiance = unpack_shared_exponent(texel.z, RADIANCE_BITS);
+    block.excess = unpack_shared_exponent(texel.w, EXCESS_BITS);
     block.certainty = f32(texel.w >> 26u) * (1.0 / 63.0);
     block.is_whole = texel.x >= 0x80000000u;
     return block;

@@ -78,11 +78,16 @@ struct Plane {
 }
 
 fn plane_of(guide: Guide, position: vec3<f32>) -> Plane {
+    return plane_within(guide, position, NORMAL_TOLERANCE);
+}
+
+// `normal_tolerance`: smallest angle, in radians, that normals may differ by.
+fn plane_within(guide: Guide, position: vec3<f32>, normal_tolerance: f32) -> Plane {
     // Of surfaces that are next to nothing away it would be infinite. A quotient of constants, as DXC makes one of
     // 1 / (PLANE_TOLERANCE * depth), which rounds otherwise.
     let tolerance = (1.0 / PLANE_TOLERANCE) / max(guide.depth, 1e-30);
     let offset = vec4<f32>(0.0, 0.0, 0.0, dot(guide.normal, position));
-    let lobe = 1.0 / max(alpha_of(guide.roughness), NORMAL_TOLERANCE);
+    let lobe = 1.0 / max(alpha_of(guide.roughness), normal_tolerance);
     var plane: Plane;
     plane.normal = guide.normal;
     plane.distance = (vec4<f32>(guide.normal, 0.0) * frame.world_from_pixel - offset) * tolerance;

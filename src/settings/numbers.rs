@@ -148,10 +148,10 @@ numeric_settings! {
         /// A sample is an outlier beyond so many times the brightest other one of its 4x4 pixels.
         outlier_factor = 6.0, 1.0 to 65504.0;
         /// What was cut off from outliers comes back up to so many times the mean radiance around.
-        excess_limit = 8.0, 0.0 to 65504.0;
+        excess_limit = 7.0, 0.0 to 65504.0;
         /// How long history may be where the surface's motion and the reflected point's lie one footprint apart, in
         /// frames.
-        disagreement_limit = 0.25, 0.0 to 1000.0;
+        disagreement_limit = 0.2, 0.0 to 1000.0;
         /// Standard errors of brightness by which light has to change for history to be forgotten.
         light_change_sigma = 3.25, 0.1 to 1000.0;
         /// Share of the brightness that it has to change by besides.
@@ -168,7 +168,7 @@ numeric_settings! {
         /// Half axis of the filter of what was accumulated.
         filter_scale = 0.65, 0.0 to 10.0;
         /// Half axis over which the excess of outliers is spread.
-        excess_scale = 1.0, 0.0 to 10.0;
+        excess_scale = 0.85, 0.0 to 10.0;
         /// Least width at grazing angles, as a share of the length. 1 is round, less follows the lobe.
         grazing_width = 0.5, 0.01 to 1.0;
     }
