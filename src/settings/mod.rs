@@ -41,7 +41,7 @@ impl Preset {
                 settings.features.wide_taps = 2;
                 settings.features.both_histories = false;
                 settings.features.block_interpolation = false;
-                // Few taps decode what they need for less than it takes to store and load it.
+                // Few taps decode what they need in no more time than it takes to store and load it.
                 settings.features.packed_guide = false;
                 settings
             }
