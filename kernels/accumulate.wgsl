@@ -79,8 +79,9 @@ const MIRROR_WEIGHT: f32 = 2.25;
 const MIRROR_UP_TO: f32 = 0.03;
 
 // Outliers of which there are two count up to so many times what bounds single ones, against the third sample of their
-// block and history. What is above is lost.
+// block and history. What is above is lost. Where both are as good as black there is nothing to count against.
 const PAIR_FACTOR: f32 = 12.0;
+const BLACK: f32 = 0.002;
 // History counts up to so many times what bounds single outliers, against the blocks around, for each frame that it
 // holds, from this roughness on: below, what lobes see has edges.
 const UNSEEN_FACTOR: f32 = 2.0;
@@ -459,12 +460,13 @@ fn believed(history: Found, subject: Subject, light_change: f32, window: Window)
 
 // Luminance above which a sample is one of two outliers in a block, which hide each other.
 fn pair_limit(quad: Quad, found: Found) -> f32 {
-    return PAIR_FACTOR * frame.outlier_factor * max(quad.peaks.y, luminance(found.radiance));
+    let known = max(quad.peaks.y, luminance(found.radiance));
+    return select(HALF_MAX, PAIR_FACTOR * frame.outlier_factor * known, known > BLACK);
 }
 
-fn without_pair(radiance: vec3<f32>, pair_limit: f32, found: Found, roughness: f32) -> vec3<f32> {
+fn without_pair(radiance: vec3<f32>, pair_limit: f32, roughness: f32) -> vec3<f32> {
     let limit = min(1.0, pair_limit / luminance(radiance));
-    return radiance * select(1.0, limit, found.length >= 1.0 && roughness >= OUTLIER_ROUGHNESS);
+    return radiance * select(1.0, limit, roughness >= OUTLIER_ROUGHNESS);
 }
 
 fn squared_residual(radiance: vec3<f32>, found: Found) -> f32 {
@@ -490,7 +492,7 @@ fn accumulated(pixel: vec2<u32>, guide: Guide, quad: Quad, light_change: f32, wi
     var radiance = subject.radiance;
     if OUTLIER_SPREAD {
         radiance += returned_excess(subject.around, found.length, guide.roughness);
-        radiance = without_pair(radiance, pair_limit(quad, found), found, guide.roughness);
+        radiance = without_pair(radiance, pair_limit(quad, found), guide.roughness);
     }
     return continued(found, radiance, subject.share, squared_residual(radiance, found));
 }

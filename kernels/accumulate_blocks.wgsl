@@ -50,7 +50,7 @@ fn accumulate_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_inv
     loop {
         var sample = sample_of(corner + position_in_block(i), guide, quad);
         if OUTLIER_SPREAD {
-            sample = without_pair(sample + excess, limit, found, guide.roughness);
+            sample = without_pair(sample + excess, limit, guide.roughness);
         }
         radiance += sample;
         residuals += squared_residual(sample, found);

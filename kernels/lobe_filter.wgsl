@@ -28,6 +28,8 @@ import package::shared::fallback;
 
 // Near taps.
 override NEAR_TAPS: u32 = 12u;
+// Those of pixels without history, as many at least, on the same disk.
+override YOUNG_TAPS: u32 = 12u;
 // There are filtered blocks.
 override WIDE_FILTER: bool = true;
 
@@ -48,6 +50,8 @@ const NEAR_MOST: f32 = 3.0;
 const YOUNG_DIFFERENCE: f32 = 0.2;
 const DIFFERENCE_OF_FRAME: f32 = 0.1;
 const YOUNG_FIT: f32 = 0.05;
+// Frames accumulated below which there are `YOUNG_TAPS`.
+const YOUNG_LENGTH: f32 = 1.5;
 // As `NORMAL_TOLERANCE` between single pixels.
 const PIXEL_NORMAL_TOLERANCE: f32 = 0.02;
 // Half axis of the filter, in pixels, from and to which blocks take over.
@@ -169,8 +173,12 @@ fn filtered(pixel: vec2<u32>, guide: Guide, corners: Corners) -> vec4<f32> {
     let glint = (GLINT_LIMIT * luminance(own_radiance) + GLINT_FLOOR) * max(1.0, glint_axes * glint_axes)
         * max(1.0, GLINT_FRAMES / own.length);
     let own_brightness = brightness(own_radiance);
+    var taps = NEAR_TAPS;
+    if YOUNG_TAPS != NEAR_TAPS {
+        taps = select(NEAR_TAPS, YOUNG_TAPS, own.length < YOUNG_LENGTH);
+    }
     // A disk, of which weights make an ellipse: no axis decides between two pixels.
-    let reach = min(NEAR_REACH + REACH_OF_TAP * f32(NEAR_TAPS), NEAR_MOST) * inverseSqrt(max(f32(NEAR_TAPS), 1.0));
+    let reach = min(NEAR_REACH + REACH_OF_TAP * f32(NEAR_TAPS), NEAR_MOST) * inverseSqrt(max(f32(taps), 1.0));
     // From pixels to half axes.
     let falloff = 1.0 / max(radius, vec2<f32>(NEAR_LEAST));
     let side = side_of(footprint.axis);
@@ -184,7 +192,7 @@ fn filtered(pixel: vec2<u32>, guide: Guide, corners: Corners) -> vec4<f32> {
     var brightest = 0.0;
     var next = 0.0;
     // Where blocks decide alone, taps would count for nothing.
-    let taps = select(NEAR_TAPS, 0u, by_blocks >= 1.0);
+    taps = select(taps, 0u, by_blocks >= 1.0);
     if taps != 0u {
         var i = 0u;
         loop {

@@ -3,7 +3,9 @@
 use crate::plan::Stage;
 use crate::resource::Copy::{self, Current, Previous};
 use crate::resource::{Count, Extent, Format, Kind, Lifetime, Resource};
-use crate::settings::{Channel, Fallback, NormalEncoding, Pipeline, RaysPerQuad, RoughnessEncoding, Settings};
+use crate::settings::{
+    Channel, Fallback, Features, NormalEncoding, Pipeline, RaysPerQuad, RoughnessEncoding, Settings,
+};
 
 /// The denoised image, in templates: see [`resource_of`].
 const OUTPUT: &str = "output";
@@ -433,7 +435,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
         is_needed: always,
         stage: Stage::Denoise,
         grid: GridTemplate::Quads,
-        overrides: &["FALLBACK", "NEAR_TAPS", "WIDE_FILTER", "WHOLE_BLOCKS"],
+        overrides: &["FALLBACK", "NEAR_TAPS", "YOUNG_TAPS", "WIDE_FILTER", "WHOLE_BLOCKS"],
         bindings: LOBE_FILTER_BINDINGS,
     },
     PassTemplate {
@@ -467,6 +469,10 @@ fn has_blocks(settings: &Settings) -> bool {
 /// Whether a pass uses averages of the input over blocks.
 fn has_block_statistics(settings: &Settings) -> bool {
     settings.features.compares_with_blocks() || settings.features.light_change
+}
+
+fn near_taps(features: &Features) -> u32 {
+    if features.spatial_filter { features.near_taps } else { 0 }
 }
 
 fn has_wide_filter(settings: &Settings) -> bool {
@@ -584,7 +590,11 @@ pub(crate) fn override_value(settings: &Settings, name: &str) -> f64 {
         "BLOCK_STATISTICS" => f64::from(features.compares_with_blocks()),
         "BLOCK_TAPS" => f64::from(if features.block_interpolation { 4 } else { 1 }),
         "SAMPLES_ARE_USED" => f64::from(features.light_change || features.outlier_spread || has_wide_filter(settings)),
-        "NEAR_TAPS" => f64::from(if features.spatial_filter { features.near_taps } else { 0 }),
+        "NEAR_TAPS" => f64::from(near_taps(features)),
+        "YOUNG_TAPS" => match near_taps(features) {
+            0 => 0.0,
+            near => f64::from(near.max(features.young_taps)),
+        },
         "WIDE_TAPS" => f64::from(features.wide_taps),
         "WHOLE_BLOCKS" => f64::from(has_whole_blocks(settings)),
         "WIDE_FILTER" => f64::from(has_wide_filter(settings)),

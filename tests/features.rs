@@ -38,7 +38,7 @@ fn off(pipeline: Pipeline) -> Vec<(&'static str, Change)> {
         ("edge_repair", |features| features.edge_repair = false),
         ("average_mixing", |features| features.average_mixing = false),
     ];
-    let footprint: [(&str, Change); 10] = [
+    let footprint: [(&str, Change); 11] = [
         ("whole_blocks", |features| features.whole_blocks = false),
         ("both_histories", |features| features.both_histories = false),
         ("block_interpolation", |features| features.block_interpolation = false),
@@ -47,6 +47,7 @@ fn off(pipeline: Pipeline) -> Vec<(&'static str, Change)> {
         ("outlier_spread", |features| features.outlier_spread = false),
         ("wide_filter", |features| features.wide_filter = false),
         ("near_taps", |features| features.near_taps = 0),
+        ("young_taps", |features| features.young_taps = 0),
         ("wide_taps", |features| features.wide_taps = 1),
         ("block_statistics", |features| features.block_statistics = false),
     ];
@@ -63,6 +64,7 @@ fn with(pipeline: Pipeline, changes: &[Change]) -> Settings {
     let mut settings = Settings::default();
     settings.pipeline = pipeline;
     settings.features.hit_motion = true;
+    settings.features.young_taps = 16;
     changes.iter().for_each(|change| change(&mut settings.features));
     settings
 }
@@ -297,4 +299,22 @@ fn what_a_scene_does_not_use_changes_nothing_over_footprints() {
     // The comparison notices what is used.
     let filtered = run(&rough, executor, &[find(Pipeline::Footprint, "wide_filter")]);
     assert!(full.iter().zip(&filtered).any(|(a, b)| a.output() != b.output()));
+}
+
+#[test]
+fn new_pixels_have_taps_of_their_own() {
+    let executor = &mut *fastest();
+    let smooth = wall(0.1);
+    let few = run(&smooth, executor, &[|features| (features.near_taps, features.young_taps) = (4, 0)]);
+    let young = run(&smooth, executor, &[|features| (features.near_taps, features.young_taps) = (4, 8)]);
+    // Of what is the same everywhere but for noise.
+    let variance = |snapshot: &Snapshot| {
+        let output = snapshot.output();
+        let mean = output.iter().map(|texel| texel[0]).sum::<f32>() / output.len() as f32;
+        output.iter().map(|texel| (texel[0] - mean).powi(2)).sum::<f32>()
+    };
+    // All are new in the first frame, and none is later.
+    let (less, more) = (variance(&young[0]), variance(&few[0]));
+    assert!(less < 0.9 * more, "{less} and {more}");
+    assert_same("near taps", &few[1..], &young[1..]);
 }

@@ -55,6 +55,9 @@ pub struct Features {
     pub wide_filter: bool,
     /// Footprint pipeline: pixels that each is filtered with besides, 0 to 64.
     pub near_taps: u32,
+    /// Footprint pipeline: the same for pixels without history, as all are in the first frame and after a cut, 0 to 64.
+    /// Counts where there are near taps, and fewer; they reach as far as those.
+    pub young_taps: u32,
     /// Footprint pipeline: most blocks on either side of a block, along and across the footprint, that filters over
     /// blocks read, 1 to 16. What lies between is passed over where footprints are wider.
     pub wide_taps: u32,
@@ -97,6 +100,7 @@ impl Default for Features {
             block_interpolation: true,
             wide_filter: true,
             near_taps: 12,
+            young_taps: 12,
             wide_taps: 4,
             whole_blocks: true,
             normal_input: true,
@@ -150,6 +154,7 @@ impl Features {
             return refuse("the debug view average needs an average: block_statistics or outlier_spread has to be on");
         }
         check_range("features.near_taps", self.near_taps as f32, 0.0, 64.0, "0 to 64")?;
+        check_range("features.young_taps", self.young_taps as f32, 0.0, 64.0, "0 to 64")?;
         check_range("features.wide_taps", self.wide_taps as f32, 1.0, 16.0, "1 to 16")?;
         if let Some(roughness) = self.constant_roughness {
             check_range("features.constant_roughness", roughness, 0.0, 1.0, "0 to 1")?;

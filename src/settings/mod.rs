@@ -38,6 +38,7 @@ impl Preset {
             Preset::Fast => {
                 let mut settings = Settings::default();
                 settings.features.near_taps = 4;
+                settings.features.young_taps = 7;
                 settings.features.wide_taps = 2;
                 settings.features.both_histories = false;
                 settings.features.block_interpolation = false;

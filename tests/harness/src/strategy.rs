@@ -303,7 +303,7 @@ fn number_value(number: &'static Number) -> impl Strategy<Value = f32> {
 /// Features that make sense together.
 pub fn any_features() -> impl Strategy<Value = Features> {
     let roughness = prop::option::of(select(&[0.0f32, 0.01, 0.447_213_6, 1.0][..]));
-    let taps = (select(&[0u32, 1, 4, 12][..]), select(&[1u32, 2, 4, 7][..]));
+    let taps = (select(&[0u32, 1, 4, 12][..]), select(&[0u32, 7, 16][..]), select(&[1u32, 2, 4, 7][..]));
     (prop::array::uniform18(any::<bool>()), taps, roughness).prop_map(|(on, taps, constant_roughness)| {
         let mut features = Features::default();
         // One of the two has to be on.
@@ -317,7 +317,8 @@ pub fn any_features() -> impl Strategy<Value = Features> {
         features.block_interpolation = on[17];
         // Derived normals have to be kept.
         features.normal_input = on[14] || !(features.gbuffer_copy && features.packed_guide);
-        ((features.near_taps, features.wide_taps), features.constant_roughness) = (taps, constant_roughness);
+        (features.near_taps, features.young_taps, features.wide_taps) = taps;
+        features.constant_roughness = constant_roughness;
         features
     })
 }
