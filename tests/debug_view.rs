@@ -370,7 +370,8 @@ fn turn_on(settings: &Settings, view: DebugView) -> Settings {
     let mut settings = settings.clone();
     settings.features.debug_view = Some(view);
     if settings.validate().is_err() {
-        (settings.features.surface_motion, settings.features.spatial_filter) = (true, true);
+        let features = &mut settings.features;
+        (features.surface_motion, features.spatial_filter, features.block_statistics) = (true, true, true);
     }
     settings
 }
