@@ -79,8 +79,10 @@ const MIRROR_WEIGHT: f32 = 2.25;
 const MIRROR_UP_TO: f32 = 0.03;
 
 // Outliers of which there are two count up to so many times what bounds single ones, against the third sample of their
-// block and history. What is above is lost. Where both are as good as black there is nothing to count against.
+// block and history. What is above is lost.
 const PAIR_FACTOR: f32 = 12.0;
+// Luminance up to which, exposed, both are as good as black, and nothing to count against: twice the least that `luminance`
+// says.
 const BLACK: f32 = 0.002;
 // History counts up to so many times what bounds single outliers, against the blocks around, for each frame that it
 // holds, from this roughness on: below, what lobes see has edges.

@@ -540,3 +540,28 @@ fn the_order_of_workgroups_does_not_matter() {
         panic!("{error}");
     }
 }
+
+#[test]
+fn pairs_of_outliers_are_bounded_from_the_first_frame_unless_all_else_is_black() {
+    let mut executor = limpid_harness::fastest();
+    let size = UVec2::splat(32);
+    // Pixel by pixel, without the filter, which does not trust what stands out in a narrow footprint; and by whole blocks.
+    for (roughness, is_filtered) in [(0.1, false), (0.9, true)] {
+        let mut brightest_and_mean = |others: f32| {
+            let mut case = Case::still(size, 1, |_, p| {
+                let is_bright = p.y % 4 == 1 && p.x % 4 / 2 == 0;
+                let value = if is_bright { 1000.0 } else { others };
+                Pixel { radiance: [value, value, value, 3.0], roughness, ..Pixel::WALL }
+            });
+            case.settings.features.spatial_filter = is_filtered;
+            let output = last_output(&case.run(&mut *executor));
+            let values = output.iter().map(|texel| texel[0]);
+            (values.clone().fold(0.0, f32::max), values.sum::<f32>() / output.len() as f32)
+        };
+        // 12 times 6 times the third brightest.
+        let (brightest, _) = brightest_and_mean(0.05);
+        assert!(brightest < 1.1 * 72.0 * 0.05, "roughness {roughness}: {brightest}");
+        let (_, mean) = brightest_and_mean(0.0);
+        assert!(mean > 0.9 * 125.0, "roughness {roughness}: {mean}");
+    }
+}

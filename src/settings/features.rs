@@ -56,7 +56,7 @@ pub struct Features {
     /// Footprint pipeline: pixels that each is filtered with besides, 0 to 64.
     pub near_taps: u32,
     /// Footprint pipeline: the same for pixels without history, as all are in the first frame and after a cut, 0 to 64.
-    /// Counts where there are near taps, and fewer; they reach as far as those.
+    /// Has no effect where `near_taps` is 0, or as many or more. How far taps reach depends on `near_taps` alone.
     pub young_taps: u32,
     /// Footprint pipeline: most blocks on either side of a block, along and across the footprint, that filters over
     /// blocks read, 1 to 16. What lies between is passed over where footprints are wider.
