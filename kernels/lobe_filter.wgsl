@@ -52,6 +52,8 @@ const DIFFERENCE_OF_FRAME: f32 = 0.1;
 const YOUNG_FIT: f32 = 0.05;
 // Frames accumulated below which there are `YOUNG_TAPS`.
 const YOUNG_LENGTH: f32 = 1.5;
+// Turns that none reaches: more than there can be taps.
+const TURNS: u32 = 256u;
 // As `NORMAL_TOLERANCE` between single pixels.
 const PIXEL_NORMAL_TOLERANCE: f32 = 0.02;
 // Half axis of the filter, in pixels, from and to which blocks take over.
@@ -196,6 +198,12 @@ fn filtered(pixel: vec2<u32>, guide: Guide, corners: Corners) -> vec4<f32> {
     if taps != 0u {
         var i = 0u;
         loop {
+            if YOUNG_TAPS != NEAR_TAPS {
+                // None does: what Mesa needs where numbers of turns differ (kernels/README.md).
+                if i >= TURNS {
+                    break;
+                }
+            }
             i += 1u;
             let offset = round(direction * (reach * sqrt(f32(i))));
             direction = turned(direction);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::UVec2;
-use limpid::Preset;
+use limpid::{Preset, Settings};
 use limpid_cli::scene;
 use limpid_cli::sequence::{ChannelNames, Sequence};
 use limpid_harness::{Case, Executor, Table, executors};
@@ -14,8 +14,16 @@ mod frames;
 
 use frames::case;
 
-/// One of each pipeline.
-const PRESETS: [(&str, Preset); 2] = [("default", Preset::Default), ("reference", Preset::Reference)];
+/// One of each pipeline, and near taps alone, of which pixels side by side take different numbers.
+fn variants() -> [(&'static str, Settings); 3] {
+    let mut narrow = Preset::Fast.settings();
+    narrow.features.wide_filter = false;
+    [
+        ("default", Settings::default()),
+        ("fast without wide filter", narrow),
+        ("reference", Preset::Reference.settings()),
+    ]
+}
 
 fn is_first_on_device(all: &[Box<dyn Executor>], index: usize) -> bool {
     all[..index].iter().all(|other| other.device() != all[index].device())
@@ -56,12 +64,12 @@ fn check(cases: &[(String, Case)]) {
 #[test]
 fn the_built_in_scenes_are_the_same_everywhere() {
     let size = UVec2::new(120, 68);
-    for (preset, settings) in PRESETS.map(|(name, preset)| (name, preset.settings())) {
+    for (variant, settings) in variants() {
         let cases: Vec<_> = ["gallery", "courtyard", "mirrors", "dolly"]
             .map(|name| {
                 let scene = scene::by_name(name).unwrap();
                 let frames = (0..6).map(|number| scene.render(number, size, 0));
-                (format!("{name}, {preset}"), case(&settings, frames))
+                (format!("{name}, {variant}"), case(&settings, frames))
             })
             .into();
         check(&cases);
@@ -76,13 +84,13 @@ fn the_public_sequences_are_the_same_everywhere() {
         let _ = writeln!(std::io::stderr(), "SKIPPED: LIMPID_PEER_DATA names no folder with the public sequences");
         return;
     };
-    for (preset, settings) in PRESETS.map(|(name, preset)| (name, preset.settings())) {
+    for (variant, settings) in variants() {
         let cases: Vec<_> = ["glossy-room", "orbit"]
             .map(|name| {
                 let folder = Path::new(&data).join("public").join(name);
                 let sequence = Sequence::open(&folder, &ChannelNames::default()).unwrap();
                 let frames = (0..sequence.len().min(6)).map(|index| sequence.load(index).unwrap());
-                (format!("{name}, {preset}"), case(&settings, frames))
+                (format!("{name}, {variant}"), case(&settings, frames))
             })
             .into();
         check(&cases);
