@@ -4,7 +4,7 @@
 //! in   idle_frames    u32           tile    0 if a pixel of the tile is denoised: elsewhere the guide says nothing
 //! in   accumulated    rgba16float   full    this frame's `history` (history length, variance)
 //! in   radiance       any float     full    hit distance; all that `accumulate` reads (disocclusion, candidate)
-//! in   blocks         rgba32uint    block   as `accumulate` reads them (average)
+//! in   blocks         rgba32uint    block   as `accumulate` reads them (average, tile classes with whole blocks)
 //! in   motion         any float     full    uv motion of the surface (motion error)
 //! out  debug_view     rgba16float   full    rgb: linear colour, 0 to 1; a: 1
 //!
@@ -12,6 +12,7 @@
 //! contains it: what it looks up again, it looks up with the same functions.
 
 import package::accumulate;
+import package::shared::whole_blocks;
 import package::shared::debug_view;
 
 @group(1) @binding(9) var in_accumulated: texture_2d<f32>;
@@ -40,9 +41,19 @@ fn history_color(pixel: vec2<u32>, guide: Guide) -> vec3<f32> {
     return select(RED, mix(GREEN, BLUE, by_reflection), is_found);
 }
 
+fn tile_color(pixel: vec2<u32>, guide: Guide) -> vec3<f32> {
+    if WHOLE_BLOCKS {
+        let place = pixel / BLOCK_SIZE;
+        let is_whole = is_filtered_whole(unpack_block(textureLoad(in_blocks, place, 0)), vec2<i32>(place));
+        // Blocks of tiles that are not denoised say nothing.
+        return select(tile_class_color(), PALE, guide.denoised && is_whole);
+    }
+    return tile_class_color();
+}
+
 fn view_color(pixel: vec2<u32>, guide: Guide) -> vec3<f32> {
     if VIEW == TILE_CLASSES {
-        return tile_class_color();
+        return tile_color(pixel, guide);
     }
     if VIEW == MOTION_ERROR {
         let texel = textureLoad(in_motion, pixel, 0).xy;

@@ -12,6 +12,7 @@ import package::shared::frame;
 import package::shared::packing;
 import package::shared::footprint;
 import package::shared::blocks;
+import package::shared::whole_blocks;
 import package::shared::tiles;
 
 @group(1) @binding(0) var in_blocks: texture_2d<u32>;
@@ -20,23 +21,9 @@ import package::shared::tiles;
 @group(1) @binding(3) var<storage, read_write> inout_block_counters: array<atomic<u32>, 2>;
 @group(1) @binding(4) var<storage, read_write> out_block_list: array<u32>;
 
-// Half axis of the filter, in pixels, from which on its blocks are whole.
-const WHOLE_FOOTPRINT: f32 = 4.0;
-// And roughness.
-const WHOLE_ROUGHNESS: f32 = 0.15;
-
 // Blocks of the workgroup of either kind, and where theirs begin in the list.
 var<workgroup> group_counts: array<atomic<u32>, 2>;
 var<workgroup> group_first: array<u32, 2>;
-
-fn is_filtered_whole(place: vec2<i32>) -> bool {
-    let block = unpack_block(textureLoad(in_blocks, place, 0));
-    let footprint = lobe_footprint(position_at(block_place(place), block.guide.depth), block.guide, block.share);
-    let is_wide = footprint.along * frame.filter_scale >= WHOLE_FOOTPRINT;
-    // Below, history is clipped to each pixel's neighbours.
-    let is_rough = block.guide.roughness >= max(WHOLE_ROUGHNESS, frame.accumulate_clip_roughness);
-    return block.is_whole && is_wide && is_rough;
-}
 
 @compute @workgroup_size(64)
 fn list_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) lane: u32) {
@@ -51,7 +38,8 @@ fn list_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     var kind = 0u;
     var offset = 0u;
     if is_noted {
-        kind = select(0u, 1u, is_filtered_whole(vec2<i32>(place)));
+        let block = unpack_block(textureLoad(in_blocks, place, 0));
+        kind = select(0u, 1u, is_filtered_whole(block, vec2<i32>(place)));
         offset = atomicAdd(&group_counts[kind], 1u);
     }
     workgroupBarrier();

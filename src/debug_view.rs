@@ -23,7 +23,8 @@ pub enum DebugView {
     /// moves and they are right.
     MotionError,
     /// Which 8x8 tiles are denoised, and whether they hold mirrors (up to `coverage.mirror_roughness`), rougher
-    /// surfaces, or both.
+    /// surfaces, or both. With [`whole_blocks`](crate::settings::Features::whole_blocks) also which 4x4 pixels are worked on
+    /// as a whole.
     TileClasses,
     /// Where there is no history, and why.
     Disocclusion,
@@ -58,6 +59,7 @@ const RED: [f32; 3] = [0.85, 0.03, 0.03];
 const GREEN: [f32; 3] = [0.05, 0.6, 0.1];
 const BLUE: [f32; 3] = [0.05, 0.2, 0.9];
 const YELLOW: [f32; 3] = [0.9, 0.6, 0.02];
+const PALE: [f32; 3] = [0.9, 0.8, 0.5];
 const MAGENTA: [f32; 3] = [1.0, 0.0, 1.0];
 
 const fn key(color: [f32; 3], label: &'static str) -> Key {
@@ -132,6 +134,7 @@ impl DebugView {
                         key(BLUE, "mirrors"),
                         key(YELLOW, "rougher surfaces"),
                         key(GREEN, "both"),
+                        key(PALE, "4x4 pixels as a whole"),
                         key(LEFT_OUT, "nothing to denoise"),
                     ]
                 },

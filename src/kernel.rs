@@ -54,6 +54,7 @@ const SOURCES: &[(&str, &str)] = sources![
     "shared/packing",
     "shared/radiance",
     "shared/tiles",
+    "shared/whole_blocks",
 ];
 
 /// Values of a kernel's `override` constants.

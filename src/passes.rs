@@ -382,6 +382,7 @@ const FOOTPRINT_PASSES: &[PassTemplate] = &[
             "OUTLIER_SPREAD",
             "BLOCK_STATISTICS",
             "BLOCK_TAPS",
+            "WHOLE_BLOCKS",
         ],
         bindings: &[
             ("in_radiance", "radiance", Current),

@@ -317,6 +317,7 @@ fn tiles_are_those_of_the_list() {
     let mut case = wall(0.5, 1);
     case.steps[0].images = Images::new(SIZE, |p| Pixel { roughness: roughness(p), ..Pixel::WALL });
     case.settings.coverage.roughness_threshold = 0.5;
+    case.settings.features.whole_blocks = false;
     let view = DebugView::TileClasses;
     for pipeline in PIPELINES {
         let snapshot = shown(&case, pipeline, view).run(executor).remove(0);
@@ -339,6 +340,28 @@ fn tiles_are_those_of_the_list() {
             seen.insert(expected);
         }
         assert_eq!(seen.len(), 4, "{seen:?}");
+    }
+}
+
+#[test]
+fn pale_blocks_are_those_of_the_list_of_whole_ones() {
+    let case = Case::still(SIZE, 2, |frame, p| {
+        let value = 0.5 + noise(frame, p);
+        let depth = if noise(4, p / 16) < 0.2 { 0.0 } else { Pixel::WALL.depth };
+        let roughness = if noise(6, p / 4) < 0.4 { 0.02 } else { 0.8 };
+        Pixel { radiance: [value, value, value, 30.0], roughness, depth, ..Pixel::WALL }
+    });
+    let view = DebugView::TileClasses;
+    let pale = color_of(view, "4x4 pixels as a whole");
+    let blocks = SIZE.map(|side| side.div_ceil(4)).element_product() as usize;
+    for snapshot in shown(&case, Pipeline::Footprint, view).run(&mut *fastest()) {
+        let (list, args) = (&snapshot.0["block_list"], &snapshot.0["block_args"]);
+        let whole: HashSet<_> = list[blocks - args[7] as usize..blocks].iter().copied().collect();
+        assert!(whole.len() > 5 && whole.len() < blocks - 5, "{} of {blocks}", whole.len());
+        for (index, color) in (0..).zip(colors(&snapshot)) {
+            let block = UVec2::new(index % SIZE.x, index / SIZE.x) / 4;
+            assert_eq!(is_near(color, pale), whole.contains(&(block.x | block.y << 16)), "{block}");
+        }
     }
 }
 

@@ -27,6 +27,7 @@ const RED: vec3<f32> = vec3<f32>(0.85, 0.03, 0.03);
 const GREEN: vec3<f32> = vec3<f32>(0.05, 0.6, 0.1);
 const BLUE: vec3<f32> = vec3<f32>(0.05, 0.2, 0.9);
 const YELLOW: vec3<f32> = vec3<f32>(0.9, 0.6, 0.02);
+const PALE: vec3<f32> = vec3<f32>(0.9, 0.8, 0.5);
 const MAGENTA: vec3<f32> = vec3<f32>(1.0, 0.0, 1.0);
 
 // From 0 to 1 over five colours that are neither red nor magenta.
