@@ -46,19 +46,11 @@ fn run(executor: &mut dyn Executor, case: &Case, whole_blocks: bool) -> Vec<Snap
     case.run(executor)
 }
 
-/// Blocks of 4x4 pixels of either list: others, and whole ones.
-fn lists(snapshot: &Snapshot) -> [Vec<UVec2>; 2] {
-    let unpacked = |words: &[u32]| words.iter().map(|word| UVec2::new(word & 0xffff, word >> 16)).collect();
-    let (list, args) = (&snapshot.0["block_list"], &snapshot.0["block_args"]);
-    let blocks = SIZE.map(|side| side.div_ceil(4)).element_product() as usize;
-    [unpacked(&list[..args[3] as usize]), unpacked(&list[blocks - args[7] as usize..blocks])]
-}
-
 #[test]
 fn each_block_of_a_listed_tile_is_in_one_list() {
     let case = Case::still(SIZE, 3, |frame, p| pixel(frame, p, shown(p / 4)));
     for snapshot in run(&mut *fastest(), &case, true) {
-        let [others, whole] = lists(&snapshot);
+        let [others, whole] = snapshot.block_lists(SIZE);
         let mut times = BTreeMap::<[u32; 2], u32>::new();
         others.iter().chain(&whole).for_each(|block| *times.entry(block.to_array()).or_default() += 1);
         assert!(times.values().all(|&count| count == 1));
@@ -85,7 +77,7 @@ fn a_whole_block_has_one_history() {
     let case = Case::still(SIZE, 4, |frame, p| pixel(frame, p, shown(p / 4)));
     for snapshot in run(&mut *fastest(), &case, true) {
         let history = &snapshot.0["history"];
-        let [_, whole] = lists(&snapshot);
+        let [_, whole] = snapshot.block_lists(SIZE);
         for block in whole {
             let texel = |i: u32| {
                 let p = block * 4 + UVec2::new(i % 4, i / 4);

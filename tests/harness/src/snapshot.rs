@@ -10,6 +10,14 @@ use limpid::resource::{Copy, Count, Extent, Kind, Resource, TILE_SIZE};
 pub struct Snapshot(pub BTreeMap<String, Vec<u32>>);
 
 impl Snapshot {
+    /// Blocks of 4x4 pixels that a frame of a size listed: others, and whole ones.
+    pub fn block_lists(&self, frame: UVec2) -> [Vec<UVec2>; 2] {
+        let unpacked = |words: &[u32]| words.iter().map(|word| UVec2::new(word & 0xffff, word >> 16)).collect();
+        let (list, args) = (&self.0["block_list"], &self.0["block_args"]);
+        let blocks = frame.map(|side| side.div_ceil(4)).element_product() as usize;
+        [unpacked(&list[..args[3] as usize]), unpacked(&list[blocks - args[7] as usize..blocks])]
+    }
+
     /// Reads what a plan names and can be read after a frame of a size, by functions that read a texture and a buffer.
     pub fn take(
         plan: &Plan,
